@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Quasi-harmonic maps of surfaces to the plane (Zayer, Roessl, Seidel 2005), on NumPy and SciPy alone.
+
+`unwrap` makes UVs, `distortion` measures them, `Settings` says how; errors are `UnwrapError`.
+"""
+
+from .distortion import Distortion, distortion
+from .errors import UnwrapError
+from .quasi_harmonic import State
+from .settings import Settings
+from .surface import Surface
+from .unwrapping import Report, Result, unwrap, unwrap_steps
+
+__all__ = [
+    "Distortion",
+    "Report",
+    "Result",
+    "Settings",
+    "State",
+    "Surface",
+    "UnwrapError",
+    "distortion",
+    "unwrap",
+    "unwrap_steps",
+]

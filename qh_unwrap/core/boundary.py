@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the island's outline goes in the plane."""
+
+from itertools import combinations
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from .errors import BoundaryError, PinError, UVError
+from .initial import project
+from .surface import edge_lengths, perimeter
+
+_BOW = 0.02  # how far a side bulges, by its length, where it must not be straight
+_CORNER_CANDIDATES = 40
+
+
+def held_vertices(surface, settings, uv=None, pinned=None):
+    """The vertices whose place is given, and where that is: (n,) bool and (n, 2), and a tuple of warnings.
+
+    Raises `UVError`, `PinError` or `BoundaryError` where the settings cannot be followed.
+    """
+    warnings = ()
+    loop = surface.loops[0]
+    if settings.boundary != "RECTANGLE" and settings.boundary != "KEEP" and pinned is not None and pinned.any():
+        raise PinError("pins need the boundary KEEP (this one moves the whole outline): unpin, or keep the boundary")
+    if settings.boundary == "KEEP":
+        if uv is None:
+            raise UVError("a kept boundary needs UVs, and there are none: choose another boundary")
+        return _kept(surface, uv, pinned), uv, warnings
+    if settings.boundary == "CIRCLE":
+        places = _circle(surface.vertices[loop])
+    elif settings.boundary == "RECTANGLE":
+        places, bowed = _on_polygon(surface, *_rectangle(surface, settings.aspect, pinned))
+    else:
+        places, bowed = _on_polygon(surface, *_hull(surface))
+    if settings.boundary != "CIRCLE" and bowed:
+        sides = "a side is" if bowed == 1 else f"{bowed} sides are"
+        warnings = (f"{sides} bowed by {_BOW:.0%}, since edges join two of its vertices",)
+    held = np.zeros(len(surface.vertices), bool)
+    held[loop] = True
+    values = np.zeros((len(surface.vertices), 2))
+    values[loop] = places
+    return held, values, warnings
+
+
+def _circle(points):
+    # By arc length, from the vertex farthest from the middle: independent of how the vertices are numbered.
+    first = int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+    angle = 2 * np.pi * np.roll(_fractions(np.roll(points, -first, axis=0)), first)
+    return 0.5 + 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _fractions(points):
+    # Where along the closed polygon each point lies, from 0 for the first to less than 1; no two in one place
+    length = edge_lengths(points)
+    length = np.maximum(length, 1e-3 * length.mean())
+    return np.concatenate([[0.0], np.cumsum(length)[:-1]]) / length.sum()
+
+
+def _rectangle(surface, aspect, pinned):
+    loop = surface.loops[0]
+    if len(loop) < 4:
+        raise BoundaryError("a rectangle needs an outline of at least four vertices: choose another boundary")
+    corners = _chosen_corners(surface, aspect) if pinned is None or not pinned.any() else _pinned_corners(loop, pinned)
+    at = _fractions(surface.vertices[loop])
+    share = np.diff(at[corners], append=at[corners[0]] + 1)
+    across, up = share[0] + share[2], share[1] + share[3]
+    if (across < up) != (0 < aspect < 1):
+        corners = np.roll(corners, -1)
+        across, up = up, across
+    width, height = (aspect, 1.0) if aspect else (across, up)
+    size = max(width, height)
+    polygon = np.array([[0, 0], [width, 0], [width, height], [0, height]]) / size
+    return polygon, *_along_sides(surface, corners)
+
+
+def _along_sides(surface, corners):
+    """Which side each outline vertex lies on, and how far along it by arc length (0 at the first corner)."""
+    loop = surface.loops[0]
+    order = np.roll(np.arange(len(loop)), -corners[0])
+    at = _fractions(surface.vertices[loop[order]])
+    start = at[(np.asarray(corners) - corners[0]) % len(loop)]
+    side = np.empty(len(loop), dtype=np.int64)
+    along = np.empty(len(loop))
+    side[order] = np.searchsorted(start, at, side="right") - 1
+    along[order] = (at - start[side[order]]) / np.diff(start, append=1.0)[side[order]]
+    return side, along
+
+
+def _pinned_corners(loop, pinned):
+    corners = np.flatnonzero(pinned[loop])
+    if len(corners) != 4 or pinned.sum() != 4:
+        raise PinError(
+            f"a rectangle takes its corners from four pinned vertices of the outline, and {pinned.sum()} are pinned,"
+            f" {len(corners)} of them on the outline: pin four, or none"
+        )
+    return corners
+
+
+def _chosen_corners(surface, aspect):
+    """Four places in the outer loop that turn sharply and cut it into sides that suit the rectangle."""
+    loop = surface.loops[0]
+    at = _fractions(surface.vertices[loop])
+    turn = surface.boundary_angle_deficit
+    # What the outline turns within 1.5 % of its length on either side, the vertex itself counting double
+    total = np.concatenate([[0.0], np.cumsum(np.tile(turn, 3))])
+    around = np.concatenate([at - 1, at, at + 1])
+    window = 0.015
+    turning = turn + total[np.searchsorted(around, at + window, "right")] - total[np.searchsorted(around, at - window)]
+    candidates = []
+    for place in np.argsort(-turning, kind="stable"):
+        gap = np.abs(at[candidates] - at[place]) if candidates else np.ones(1)
+        if np.minimum(gap, 1 - gap).min() >= 1 / (2 * _CORNER_CANDIDATES):
+            candidates.append(place)
+        if len(candidates) == _CORNER_CANDIDATES:
+            break
+    if len(candidates) < 4:
+        candidates = np.argsort(-turning, kind="stable")[:4]
+    sets = np.array(list(combinations(np.sort(candidates), 4)))
+    share = np.diff(at[sets], axis=1, append=at[sets[:, :1]] + 1)
+    uneven = (share[:, 0] - share[:, 2]) ** 2 + (share[:, 1] - share[:, 3]) ** 2
+    if aspect:
+        wanted = aspect / (1 + aspect)
+        across = share[:, 0] + share[:, 2]
+        uneven += np.minimum((across - wanted) ** 2, (1 - across - wanted) ** 2)
+    sharp = np.minimum(turning[sets], np.pi).sum(axis=1)
+    return sets[np.argmax(sharp - 20 * uneven)]
+
+
+def _hull(surface):
+    loop = surface.loops[0]
+    flat = project(surface)[loop]
+    try:
+        corners = ConvexHull(flat).vertices
+    except QhullError:
+        raise BoundaryError("the outline's flat view is a line: choose another boundary") from None
+    polygon = flat[corners]
+    corners = np.roll(corners, -int(np.argmin(corners)))
+    polygon = flat[corners]
+    if (np.diff(corners) > 0).all():
+        side, along = _along_sides(surface, corners)
+    else:
+        # The flat view of the outline meets its own hull out of order: spread it along the hull by length.
+        start = np.append(_fractions(polygon), 1.0)
+        at = _fractions(surface.vertices[loop])
+
+        def spread(shift):
+            here = (at + shift) % 1
+            side = np.clip(np.searchsorted(start, here, side="right") - 1, 0, len(polygon) - 1)
+            return side, (here - start[side]) / np.diff(start)[side]
+
+        def misfit(shift):
+            side, along = spread(shift)
+            ends = polygon[side], np.roll(polygon, -1, axis=0)[side]
+            return ((ends[0] + along[:, None] * (ends[1] - ends[0]) - flat) ** 2).sum()
+
+        side, along = spread(min(np.arange(256) / 256, key=misfit))
+    polygon = polygon - polygon.min(axis=0)
+    return polygon / polygon.max(), side, along
+
+
+def _on_polygon(surface, polygon, side, along):
+    """Places on a convex polygon (k, 2), and how many of its sides had to be bowed.
+
+    Where an inner edge joins two vertices of a straight side, its triangle would collapse.
+    """
+    start, end = polygon, np.roll(polygon, -1, axis=0)
+    position = np.full(len(surface.vertices), -1)
+    position[surface.loops[0]] = np.arange(len(side))
+    inner = np.ones(len(surface.edges), bool)
+    inner[surface.half_edge_edges[surface.on_boundary]] = False
+    i, j = position[surface.edges[inner & (position[surface.edges] >= 0).all(axis=1)]].T
+    # A corner lies on two sides
+    before = np.where(along == 0, (side - 1) % len(polygon), side)
+    bowed = np.zeros(len(polygon), bool)
+    for one, other in ((side, side), (side, before), (before, side), (before, before)):
+        bowed[one[i][one[i] == other[j]]] = True
+    direction = (end - start)[side]
+    outward = np.column_stack([direction[:, 1], -direction[:, 0]])
+    bulge = 4 * _BOW * along * (1 - along) * bowed[side]
+    return start[side] + along[:, None] * direction + bulge[:, None] * outward, int(bowed.sum())
+
+
+def _kept(surface, uv, pinned):
+    """Hold every boundary loop, and the pins."""
+    held = np.zeros(len(surface.vertices), bool)
+    for loop in surface.loops:
+        held[loop] = True
+    if not enclosed_area(uv[outer_loop(surface, uv)]) > 0:
+        raise BoundaryError("the UVs' outline encloses no area: choose another boundary")
+    crossings = count_crossings([uv[loop] for loop in surface.loops])
+    if crossings:
+        raise BoundaryError(f"the UVs' outline crosses itself {crossings} times: untangle it, or choose another boundary")
+    return held if pinned is None else held | pinned
+
+
+def outer_loop(surface, uv):
+    """The loop that encloses the largest area in the plane."""
+    return max(surface.loops, key=lambda loop: abs(enclosed_area(uv[loop])))
+
+
+def enclosed_area(points):
+    """Signed area within the closed polygon (n, 2), positive counter-clockwise."""
+    (x, y), (next_x, next_y) = (points - points[0]).T, (np.roll(points, -1, axis=0) - points[0]).T
+    return 0.5 * (x * next_y - y * next_x).sum()
+
+
+def count_crossings(polygons):
+    """How many pairs of sides of the closed polygons, each (n, 2), properly cross."""
+    start = np.concatenate(polygons)
+    end = np.concatenate([np.roll(points, -1, axis=0) for points in polygons])
+    order = np.argsort(np.minimum(start[:, 0], end[:, 0]), kind="stable")
+    start, end = start[order], end[order]
+    left, right = np.minimum(start[:, 0], end[:, 0]), np.maximum(start[:, 0], end[:, 0])
+    first = np.arange(len(start))
+    crossings = 0
+    # Sides sorted by their left ends: compare each with its followers as long as those begin before it ends.
+    for ahead in range(1, len(start)):
+        first = first[first + ahead < len(start)]
+        first = first[left[first + ahead] <= right[first]]
+        if not len(first):
+            break
+        second = first + ahead
+        apart = _side_of(start[first], end[first], start[second]) * _side_of(start[first], end[first], end[second]) < 0
+        across = _side_of(start[second], end[second], start[first]) * _side_of(start[second], end[second], end[first])
+        crossings += int(np.sum(apart & (across < 0)))
+    return crossings
+
+
+def _side_of(a, b, c):
+    return np.sign((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])

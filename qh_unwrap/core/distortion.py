@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a map distorts a surface, area-weighted on the surface and independent of the map's overall scale."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .errors import UVError
+from .surface import Surface
+from .tensor import squared_stretches
+from .validity import orientation
+
+
+@dataclass(frozen=True, eq=False)
+class Distortion:
+    """Measures of one map.  The arrays hold one value for every triangle; the ideal is 1, for `log_area` 0."""
+
+    l2_stretch: float
+    """Root mean square stretch from the plane to the surface (Sander et al. 2001); ideal 1."""
+    symmetric_dirichlet: float
+    """Mean of (s1^2 + s2^2 + s1^-2 + s2^-2) / 4 at equal total areas; ideal 1."""
+    angle: float
+    """Mean ratio of the larger to the smaller stretch; ideal 1."""
+    area: float
+    """Root mean square of the logarithm of the relative area; ideal 0."""
+    flips: int
+    """Triangles that are turned against their winding in 32-bit floats."""
+    collapsed: int
+    """Triangles without area in 32-bit floats, those without area on the surface not counted."""
+    triangle_stretch: np.ndarray = field(repr=False)
+    triangle_angle: np.ndarray = field(repr=False)
+    triangle_log_area: np.ndarray = field(repr=False)
+    triangle_orientation: np.ndarray = field(repr=False)
+
+    def to_dict(self):
+        """The measures without the arrays."""
+        names = ("l2_stretch", "symmetric_dirichlet", "angle", "area", "flips", "collapsed")
+        return {name: getattr(self, name) for name in names}
+
+
+def measure(surface, uv):
+    """The `Distortion` of the map `uv` (n, 2) of a `Surface`."""
+    larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
+    share = surface.area / surface.area.sum()
+    stretch = (1 / larger + 1 / smaller) / 2
+    angle = np.sqrt(larger / smaller)
+    log_area = (np.log(larger) + np.log(smaller)) / 2
+    sign = orientation(uv, surface.triangles)
+    sign[(sign == 0) & surface.degenerate] = 1
+    return Distortion(
+        l2_stretch=float(np.sqrt(share @ stretch)),
+        symmetric_dirichlet=float(share @ (larger + smaller + 1 / larger + 1 / smaller) / 4),
+        angle=float(share @ angle),
+        area=float(np.sqrt(share @ log_area**2)),
+        flips=int(np.sum(sign < 0)),
+        collapsed=int(np.sum(sign == 0)),
+        triangle_stretch=np.sqrt(stretch),
+        triangle_angle=angle,
+        triangle_log_area=log_area,
+        triangle_orientation=sign,
+    )
+
+
+def distortion(vertices, triangles, uv):
+    """The `Distortion` of a map.
+
+    Parameters
+    ----------
+    vertices : (n, 3), any unit
+    triangles : (m, 3), consistently wound
+    uv : (n, 2)
+
+    Raises a subclass of `SurfaceError` for a bad surface, `UVError` for bad UVs.
+    """
+    surface = Surface(vertices, triangles)
+    return measure(surface, checked_uv(surface, uv))
+
+
+def checked_uv(surface, uv):
+    """`uv` as an (n, 2) array of finite floats; raises `UVError`."""
+    uv = np.asarray(uv, dtype=np.float64)
+    if uv.shape != (len(surface.vertices), 2):
+        raise UVError(f"the UVs must have the shape ({len(surface.vertices)}, 2), not {uv.shape}")
+    if not np.isfinite(uv).all():
+        raise UVError("some UVs are no numbers (NaN or infinite): reset them, or start from another map")
+    return uv

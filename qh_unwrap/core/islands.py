@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From faces and seams to the islands that are unwrapped one by one.
+
+A *corner* is one vertex of one face; the corners of a face follow each other, and corner `c` starts the face's edge
+`corner_edge[c]`.  Corners become one UV vertex where faces hang together across an edge, and only there: so a seam
+inside an island opens it, and a vertex where two fans of faces merely touch is split.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+
+@dataclass(frozen=True)
+class Island:
+    """Faces that hang together; its n vertices are UV vertices, of which a mesh vertex may have several."""
+
+    faces: np.ndarray  # (f,) mesh faces
+    corners: np.ndarray  # (c,) mesh corners
+    corner_vertex: np.ndarray  # (c,) island vertex of each of these corners
+    vertices: np.ndarray  # (n,) mesh vertex of each island vertex
+    triangles: np.ndarray  # (t, 3) island vertices
+
+
+def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_triangles):
+    """Split the selected faces into islands, ordered by their first face.
+
+    corner_vertex, corner_edge  (c,) vertex and edge of each corner
+    face_start                  (f,) first corner of each face, ascending
+    seam                        (e,) bool, one per edge
+    selected                    (f,) bool, the faces to split
+    corner_triangles            (t, 3) the faces' triangles, as corners
+
+    Faces are neighbours across an edge that is no seam and that exactly two selected faces use, in opposite
+    directions.
+    """
+    corner_count, face_count = len(corner_vertex), len(face_start)
+    face_end = np.append(face_start[1:], corner_count)
+    corner_face = np.repeat(np.arange(face_count), face_end - face_start)
+    following = np.arange(1, corner_count + 1)
+    following[face_end - 1] = face_start
+
+    one, other = _across_edges(corner_vertex, corner_edge, seam, np.flatnonzero(selected[corner_face]))
+    uv_vertex = _components(
+        corner_count, np.concatenate([one, following[one]]), np.concatenate([following[other], other])
+    )
+    face_island = _components(face_count, corner_face[one], corner_face[other])
+
+    faces = _by_island(np.flatnonzero(selected), face_island)
+    corners = _by_island(np.flatnonzero(selected[corner_face]), face_island[corner_face])
+    triangle_face = corner_face[corner_triangles[:, 0]]
+    triangles = _by_island(np.flatnonzero(selected[triangle_face]), face_island[triangle_face])
+
+    islands = []
+    island_vertex = np.empty(corner_count, dtype=np.intp)
+    for own_faces, own_corners, own_triangles in zip(faces, corners, triangles, strict=True):
+        _, first, inverse = np.unique(uv_vertex[own_corners], return_index=True, return_inverse=True)
+        island_vertex[own_corners] = inverse
+        islands.append(
+            Island(
+                faces=own_faces,
+                corners=own_corners,
+                corner_vertex=inverse,
+                vertices=corner_vertex[own_corners[first]],
+                triangles=island_vertex[corner_triangles[own_triangles]],
+            )
+        )
+    return islands
+
+
+def _across_edges(corner_vertex, corner_edge, seam, corners):
+    """The pairs of corners (one on each side) whose edge joins two faces."""
+    uses = np.bincount(corner_edge[corners], minlength=len(seam))
+    inner = corners[((uses == 2) & ~seam)[corner_edge[corners]]]
+    one, other = inner[np.argsort(corner_edge[inner], kind="stable")].reshape(-1, 2).T
+    opposite = corner_vertex[one] != corner_vertex[other]
+    return one[opposite], other[opposite]
+
+
+def _components(count, one, other):
+    links = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(count, count))
+    return connected_components(links, directed=False)[1]
+
+
+def _by_island(items, island):
+    """The items grouped by their island, groups in order of their smallest item."""
+    items = items[np.argsort(island[items], kind="stable")]
+    groups = np.split(items, np.flatnonzero(np.diff(island[items])) + 1) if len(items) else []
+    return sorted(groups, key=lambda group: group[0])

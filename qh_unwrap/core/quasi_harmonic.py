@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The iteration: a map gives tensors, the tensors weights, the weights a better map."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .errors import SettingsError
+from .tensor import squared_stretches
+from .validity import Repair
+from .weights import scheme
+
+_REMEMBER_ABOVE = 0.375  # the balance above which forgotten repairs make the iteration oscillate
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The map after an iteration."""
+
+    iteration: int
+    """0 for the initial map."""
+    uv: np.ndarray = field(repr=False)
+    """(n, 2)"""
+    change: float
+    """The largest movement of a vertex by the layout's diameter; infinite for the initial map."""
+    valid: bool
+    """No triangle is flipped or collapsed in 32-bit floats."""
+    repaired: bool
+    """Weights had to be changed, in this iteration or an earlier one, to turn flipped triangles back."""
+
+
+def iterate(surface, dirichlet, settings, uv):
+    """Improve the map `uv` (n, 2); yields a `State` for it and after every iteration, ends when converged.
+
+    One iteration takes the tensor M of the map (section 4 of the paper, eq. 7) in every triangle, discretises
+    div(M grad f) = 0 (eq. 10) and solves for both coordinates.
+
+    Raises `SettingsError` where the weights cannot be used with the balance.
+    """
+    _check_balance(settings)
+    next_weights = scheme(surface, settings)
+    repair = Repair(surface, dirichlet, remember=settings.balance > _REMEMBER_ABOVE)
+    repairing = settings.repair and settings.weights == "COTANGENT"
+    change = np.inf
+    yield State(0, uv, change, not repair.invalid(uv).any(), False)
+    for iteration in range(1, settings.iterations + 1):
+        if change <= settings.tolerance:
+            return
+        weights = next_weights(uv)
+        previous, uv = uv, repair.solve(weights, uv) if repairing else dirichlet.solve(weights)
+        change = float(np.linalg.norm(uv - previous, axis=1).max() / diameter(uv))
+        yield State(iteration, uv, change, not repair.invalid(uv).any(), repair.active)
+
+
+def _check_balance(settings):
+    if settings.weights == "MEAN_VALUE" and settings.balance > 0.5:
+        raise SettingsError(
+            "mean value weights diverge for a balance above 0.5: lower it, or use the weights COTANGENT"
+        )
+    if settings.weights == "MEAN_VALUE_SCALAR" and settings.balance == 1:
+        raise SettingsError(
+            "area-only weights change nothing at balance 1: lower it, or take the start MEAN_VALUE with 0 iterations"
+        )
+
+
+def diameter(uv):
+    """The diagonal of the layout's bounding box, never zero."""
+    return max(float(np.linalg.norm(np.ptp(uv, axis=0))), np.finfo(float).tiny)
+
+
+def energy(surface, uv, balance):
+    """What the iteration at a balance comes near to making least: symmetric Dirichlet at 0.25, area-weighted.
+
+    The mean of `a^p b^r` with `a = (s1/s2 + s2/s1) / 2` (angle) and `b = (s1 s2 + 1 / (s1 s2)) / 2` (area).
+    """
+    larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
+    angle = (np.sqrt(larger / smaller) + np.sqrt(smaller / larger)) / 2
+    area = (np.sqrt(larger * smaller) + 1 / np.sqrt(larger * smaller)) / 2
+    p, r = np.clip(4 * balance, 0.05, 1), min(1.0, 4 / 3 * (1 - balance))
+    return float(surface.area @ (angle**p * area**r) / surface.area.sum())

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every setting's name, default, range and description, written down once.
+
+The operator, the panel, the command line and the Python API are all made from these fields.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+
+from .errors import SettingsError
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One value of an enumerated setting."""
+
+    identifier: str
+    label: str
+    description: str
+
+
+def _setting(default, label, description, *, range=None, soft_range=None, choices=()):
+    metadata = dict(
+        label=label, description=description, range=range, soft_range=soft_range or range, choices=choices
+    )
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+_INITIAL = (
+    Choice("AUTO", "Automatic", "The existing UVs for a kept boundary if they have no flips, else mean value"),
+    Choice("UNIFORM", "Uniform", "Each vertex at the average of its neighbours (Tutte)"),
+    Choice("HARMONIC", "Harmonic", "Angle preserving with the boundary held (cotangent weights)"),
+    Choice("MEAN_VALUE", "Mean Value", "Free of flips on a convex boundary, whatever the mesh (Floater 2003)"),
+    Choice("CONFORMAL", "Conformal", "Angle preserving with a natural boundary (spectral conformal map)"),
+    Choice("PROJECTION", "Projection", "Flat view along the average normal; foldovers correct themselves"),
+    Choice("CURRENT", "Current UVs", "Start from the UVs that the mesh has"),
+)
+
+_BOUNDARY = (
+    Choice("CIRCLE", "Circle", "The outline becomes a circle"),
+    Choice("RECTANGLE", "Rectangle", "The outline becomes a rectangle; pin four outline vertices to choose its corners"),
+    Choice("OUTLINE", "Convex Outline", "The outline becomes the convex hull of its flat view"),
+    Choice("KEEP", "Keep", "The outline stays where the UVs have it, and so do pinned vertices"),
+)
+
+_WEIGHTS = (
+    Choice("COTANGENT", "Cotangent", "Least distortion: finite elements with the full tensor (eq. 12)"),
+    Choice("MEAN_VALUE", "Mean Value", "Never flips on a convex boundary; balance up to 0.5 (appendix A)"),
+    Choice("MEAN_VALUE_SCALAR", "Mean Value, Area Only", "Mean value weights that correct areas only (eq. 15)"),
+    Choice("STRETCH", "Stretch", "For comparison: stretch minimisation of Yoshizawa et al. 2004"),
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to unwrap.  Values are checked when the object is made; raises `SettingsError`."""
+
+    boundary: str = _setting("CIRCLE", "Boundary", "The shape of the island's outline", choices=_BOUNDARY)
+    aspect: float = _setting(
+        1.0,
+        "Aspect",
+        "Width by height of the rectangle; 0 takes it from the island's own sides",
+        range=(0.0, 100.0),
+        soft_range=(0.0, 10.0),
+    )
+    iterations: int = _setting(
+        6,
+        "Iterations",
+        "At most this many improvements of the initial map; 0 keeps the initial map",
+        range=(0, 1000),
+        soft_range=(0, 30),
+    )
+    balance: float = _setting(
+        0.25,
+        "Balance",
+        "From even areas (0) to true angles (1). 0.25 distorts textures least; 0.5 is the published"
+        " quasi-harmonic map",
+        range=(0.0, 1.0),
+    )
+    weights: str = _setting("COTANGENT", "Weights", "How the improvement is computed", choices=_WEIGHTS)
+    initial: str = _setting("AUTO", "Start", "The map that is improved", choices=_INITIAL)
+    repair: bool = _setting(True, "Repair Flips", "Turn flipped faces over (cotangent weights)")
+    fill_holes: bool = _setting(
+        True, "Fill Holes", "Treat holes as if they were closed, so that they keep their shape; else they move freely"
+    )
+    tensor_power: float = _setting(
+        1.0,
+        "Tensor Power",
+        "Strength of each improvement, the power of the tensor; 1 is exact for strips, 2 hardly converges",
+        range=(0.01, 2.0),
+    )
+    tolerance: float = _setting(
+        1e-3,
+        "Tolerance",
+        "Stop when no vertex moves by more than this part of the layout's size",
+        range=(0.0, 1.0),
+        soft_range=(0.0, 0.01),
+    )
+
+    def __post_init__(self):
+        for field in dataclasses.fields(self):
+            _check(field, getattr(self, field.name))
+
+
+def _check(field, value):
+    meta = field.metadata
+    if meta["choices"]:
+        names = [choice.identifier for choice in meta["choices"]]
+        if value not in names:
+            raise SettingsError(f"{field.name} is {value!r}: choose one of {', '.join(names)}")
+    elif field.type is bool:
+        if value not in (True, False):
+            raise SettingsError(f"{field.name} is {value!r}: choose True or False")
+    else:
+        low, high = meta["range"]
+        whole = field.type is not int or value == int(value)
+        if not (low <= value <= high and whole):
+            kind = "a whole number" if field.type is int else "a number"
+            raise SettingsError(f"{field.name} is {value!r}: choose {kind} from {low} to {high}")

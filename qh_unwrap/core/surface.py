@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A triangulated surface, checked once when it is made; everything after it trusts it."""
+
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from . import errors
+
+# A triangle lower than this part of its longest edge is given that height, so that nothing divides by zero.
+FLATTEST = 1e-6
+
+
+class Surface:
+    """A connected, orientable, manifold triangle surface of genus 0 with at least one boundary loop.
+
+    Parameters
+    ----------
+    vertices : (n, 3) floats, any unit
+    triangles : (m, 3) integers, consistently wound
+
+    Attributes
+    ----------
+    vertices : (n, 3), the input, moved and scaled so that its area is 1
+    triangles : (m, 3)
+    edges : (k, 2), each edge once, smaller index first
+    triangle_edges : (m, 3), the edge from corner c to corner c + 1
+    flat : (m, 3, 2), the corners of every triangle laid isometrically in the plane, counter-clockwise
+    area : (m,), positive, in the scale of `vertices`
+    degenerate : (m,), True where the surface's triangle has no area and `flat` is made up
+    on_boundary : (3 m,), True for half-edges without a neighbour
+    loops : list of boundary loops, the longest first, each in the direction of its triangles' winding
+
+    Raises a subclass of `SurfaceError`, one for each cause.
+    """
+
+    def __init__(self, vertices, triangles):
+        vertices, triangles = _checked_arrays(vertices, triangles)
+        self.triangles = triangles
+        self._check_triangles(len(vertices))
+        self.vertices = _normalised(vertices, triangles)
+        self._check_edges()
+        self._check_vertices()
+        self.loops = self._boundary_loops()
+        self._check_topology()
+        self.flat, self.degenerate = _isometric_corners(self.vertices[triangles])
+        self.area = signed_areas(self.flat)
+
+    def _check_triangles(self, n):
+        triangles = self.triangles
+        repeated = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+        if repeated.any():
+            raise errors.DegenerateError(
+                f"{_faces(repeated)} with one vertex twice: dissolve degenerate faces", np.flatnonzero(repeated)
+            )
+        if len(np.unique(triangles)) < n:
+            raise errors.LooseVertexError("some vertices belong to no face: delete the loose vertices")
+        a, b, c = np.sort(triangles, axis=1).T
+        order = np.lexsort((c, b, a))
+        same = (np.diff(a[order]) == 0) & (np.diff(b[order]) == 0) & (np.diff(c[order]) == 0)
+        if same.any():
+            raise errors.DuplicateError(
+                f"{_faces(same)} on top of another with the same corners: delete the duplicates", order[1:][same]
+            )
+
+    def _check_edges(self):
+        n = len(self.vertices)
+        start, end = self.half_edges
+        key = np.minimum(start, end) * n + np.maximum(start, end)
+        unique, edge, count = np.unique(key, return_inverse=True, return_counts=True)
+        if count.max() > 2:
+            raise errors.NonManifoldEdgeError(
+                f"{np.sum(count > 2)} edges have more than two faces: split the faces there, or mark seams",
+                np.flatnonzero(count[edge] > 2) % len(self.triangles),
+            )
+        self.edges = np.column_stack([unique // n, unique % n])
+        self.triangle_edges = edge.reshape(3, -1).T
+        forward = np.bincount(edge, weights=start < end, minlength=len(unique))
+        wrong = (count == 2) & (forward != 1)
+        if wrong.any():
+            raise errors.WindingError(
+                f"the faces at {wrong.sum()} edges face opposite ways: recalculate the normals",
+                np.flatnonzero(wrong[edge]) % len(self.triangles),
+            )
+        self.on_boundary = count[edge] == 1
+
+    def _check_vertices(self):
+        # Two corners at one vertex belong to one fan if their triangles share an edge there.
+        m = len(self.triangles)
+        corner = np.arange(3 * m)  # corner c of triangle t is c * m + t, which is also the half-edge that starts there
+        following = (corner + m) % (3 * m)
+        first, second = self._twins
+        link = np.concatenate([first, following[first]]), np.concatenate([following[second], second])
+        graph = coo_array((np.ones(len(link[0]), bool), link), shape=(3 * m, 3 * m))
+        fans, fan = connected_components(graph, directed=False)
+        if fans > len(self.vertices):
+            fans_at = np.bincount(self.triangles.T.ravel()[np.unique(fan, return_index=True)[1]])
+            wrong = np.flatnonzero(fans_at > 1)
+            raise errors.NonManifoldVertexError(
+                f"at {len(wrong)} vertices the surface touches itself: split these vertices",
+                np.flatnonzero(np.isin(self.triangles, wrong).any(axis=1)),
+            )
+
+    def _check_topology(self):
+        n, m = len(self.vertices), len(self.triangles)
+        a, b = self.edges.T
+        graph = coo_array((np.ones(len(a), bool), (a, b)), shape=(n, n))
+        pieces = connected_components(graph, directed=False)[0]
+        if pieces > 1:
+            raise errors.DisconnectedError(f"it has {pieces} separate pieces: unwrap each on its own")
+        if not self.loops:
+            raise errors.ClosedError("it is closed: mark a seam to cut it open")
+        handles = (2 - len(self.loops) - (n - len(self.edges) + m)) // 2
+        if handles:
+            raise errors.GenusError(
+                f"it has {handles} {'handle' if handles == 1 else 'handles'}, like a torus: mark seams to cut it open"
+            )
+
+    @property
+    def half_edges(self):
+        """Start and end vertices of the half-edges, (3 m,) each; number c * m + t runs from corner c of triangle t."""
+        corners = self.triangles.T
+        return corners.ravel(), np.roll(corners, -1, axis=0).ravel()
+
+    @property
+    def half_edge_edges(self):
+        """The edge of every half-edge, (3 m,)."""
+        return self.triangle_edges.T.ravel()
+
+    @property
+    def _twins(self):
+        # The two half-edges of every interior edge.
+        inner = np.flatnonzero(~self.on_boundary)
+        pairs = inner[np.argsort(self.half_edge_edges[inner], kind="stable")]
+        return pairs[0::2], pairs[1::2]
+
+    def _boundary_loops(self):
+        start, end = (ends[self.on_boundary] for ends in self.half_edges)
+        following = dict(zip(start.tolist(), end.tolist(), strict=True))
+        loops = []
+        while following:
+            first, vertex = following.popitem()
+            loop = [first]
+            while vertex != first:
+                loop.append(vertex)
+                vertex = following.pop(vertex)
+            # Start at the smallest index: the loop does not depend on the order of the triangles.
+            loops.append(np.roll(loop, -int(np.argmin(loop))))
+        return sorted(loops, key=lambda loop: (-round(perimeter(self.vertices[loop]), 12), loop[0]))
+
+    @cached_property
+    def boundary_angle_deficit(self):
+        """How far the outer boundary turns at each vertex of `loops[0]`: pi less the sum of its angles, in radians."""
+        angles = corner_angles(self.flat)
+        total = np.bincount(self.triangles.ravel(), weights=angles.ravel(), minlength=len(self.vertices))
+        return np.pi - total[self.loops[0]]
+
+    def filled(self):
+        """The surface with every hole (all loops but the longest) closed by a fan; its first triangles are ours."""
+        holes = self.loops[1:]
+        if not holes:
+            return self
+        n = len(self.vertices)
+        centres = [self.vertices[loop].mean(axis=0) for loop in holes]
+        fans = [np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), n + i)]) for i, loop in enumerate(holes)]
+        return Surface(np.vstack([self.vertices, *centres]), np.vstack([self.triangles, *fans]))
+
+
+def _checked_arrays(vertices, triangles):
+    try:
+        vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+        indices = np.asarray(triangles)
+        triangles = np.ascontiguousarray(indices, dtype=np.int64)
+    except (TypeError, ValueError) as error:
+        raise errors.ShapeError(f"vertices and triangles must be arrays of numbers: {error}") from None
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise errors.ShapeError(f"vertices must have the shape (n, 3), not {vertices.shape}")
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles):
+        raise errors.ShapeError(f"triangles must have the shape (m, 3) with m > 0, not {triangles.shape}")
+    if not np.array_equal(indices, triangles):
+        raise errors.ShapeError("triangles must be whole numbers")
+    if not np.isfinite(vertices).all():
+        bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+        raise errors.NotFiniteError(
+            f"{len(bad)} vertices have coordinates that are no numbers (NaN or infinite): delete or move them"
+        )
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise errors.IndexRangeError(f"a triangle refers to a vertex outside 0 to {len(vertices) - 1}")
+    return vertices, triangles
+
+
+def _normalised(vertices, triangles):
+    centred = vertices - vertices.mean(axis=0)
+    extent = np.abs(centred).max()
+    if extent > 0:
+        centred /= extent
+        a, b, c = np.moveaxis(centred[triangles], 1, 0)
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+        if area > 1e-14:
+            return centred / np.sqrt(area)
+    raise errors.DegenerateError("all its faces have zero area: there is nothing to unwrap", np.arange(len(triangles)))
+
+
+def _isometric_corners(corners):
+    """Lay triangles (m, 3, 3) in the plane: (m, 3, 2), and which of them were too flat and were given a height."""
+    m = len(corners)
+    length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    base = np.argmax(length, axis=1)
+    rows = np.arange(m)
+    order = (base[:, None] + np.arange(3)) % 3
+    a, b, c = (corners[rows, order[:, k]] for k in range(3))
+    longest = np.maximum(length[rows, base], FLATTEST * length.mean())
+    along = np.einsum("ij,ij->i", b - a, c - a) / longest
+    height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / longest
+    degenerate = height < FLATTEST * longest
+    flat = np.zeros((m, 3, 2))
+    flat[rows, order[:, 1], 0] = longest
+    flat[rows, order[:, 2], 0] = along
+    flat[rows, order[:, 2], 1] = np.maximum(height, FLATTEST * longest)
+    return flat, degenerate
+
+
+def signed_areas(corners):
+    """Signed areas of plane triangles (m, 3, 2), positive counter-clockwise."""
+    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    return 0.5 * (ax * by - ay * bx)
+
+
+def corner_angles(corners):
+    """Interior angles of plane triangles (m, 3, 2), at each corner (m, 3), in radians."""
+    ahead = np.roll(corners, -1, axis=1) - corners
+    back = np.roll(corners, 1, axis=1) - corners
+    cross = ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]
+    return np.arctan2(np.abs(cross), (ahead * back).sum(axis=2))
+
+
+def edge_lengths(points):
+    """Lengths of the sides of a closed polygon (n, d); side i runs from point i to i + 1."""
+    return np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+
+
+def perimeter(points):
+    """Length of the closed polygon (n, d)."""
+    return edge_lengths(points).sum()
+
+
+def _faces(mask):
+    count = int(np.sum(mask))
+    return f"{count} face" if count == 1 else f"{count} faces"

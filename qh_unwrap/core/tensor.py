@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The first fundamental form of a map and the tensors made from it.
+
+Fields of matrices keep the triangles in the last axis: (2, 2, m).  Symmetric tensors [[a, c], [c, b]] are the
+three rows (a, b, c) of a (3, m) array, named as in the paper's appendix A.
+
+The map runs from the surface to the plane: `G = E P^-1` with the edge matrices E of a triangle in the plane and P of
+the same triangle laid isometrically in the plane, so that a collapsed triangle needs no inverse.  Its squared singular
+values are the eigenvalues of `G^T G`; the paper's first fundamental form (eq. 4) has their inverses.
+"""
+
+import numpy as np
+
+from .surface import signed_areas
+
+_SMALLEST = 1e-12  # squared stretches are kept within this and its inverse
+
+
+def edge_matrix(corners):
+    """Edges 0-1 and 0-2 of plane triangles (m, 3, 2) as the columns of a (2, 2, m) field."""
+    return np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1).T.copy()
+
+
+def jacobian(surface, uv):
+    """Jacobian of the map from the surface to the plane in every triangle, (2, 2, m)."""
+    (e11, e12), (e21, e22) = edge_matrix(uv[surface.triangles])
+    (p11, p12), (p21, p22) = edge_matrix(surface.flat)
+    det = p11 * p22 - p12 * p21
+    return np.array(
+        [
+            [(e11 * p22 - e12 * p21) / det, (e12 * p11 - e11 * p12) / det],
+            [(e21 * p22 - e22 * p21) / det, (e22 * p11 - e21 * p12) / det],
+        ]
+    )
+
+
+def area_scale(surface, uv):
+    """The layout's area by the surface's, never zero; dividing squared stretches by it makes them free of scale."""
+    return max(abs(signed_areas(uv[surface.triangles]).sum()) / surface.area.sum(), 1e-300)
+
+
+def squared_stretches(surface, uv, side="right", smallest=_SMALLEST):
+    """Squared singular values of the map, free of scale, and twice the angle of the direction of the larger.
+
+    `side` "right" gives directions on the surface (in `surface.flat`), "left" in the plane.
+    Returns (larger, smaller, cos 2 theta, sin 2 theta), each (m,).
+    """
+    G = jacobian(surface, uv)
+    (g11, g12), (g21, g22) = G if side == "right" else G.swapaxes(0, 1)
+    a, b, c = g11**2 + g21**2, g12**2 + g22**2, g11 * g12 + g21 * g22
+    scale = area_scale(surface, uv)
+    half_difference, mean = (a - b) / 2, (a + b) / 2
+    radius = np.hypot(half_difference, c)
+    larger = mean + radius
+    det = (g11 * g22 - g12 * g21) ** 2
+    smaller = det / np.maximum(larger, np.finfo(float).tiny)  # not mean - radius, which cancels
+    radius = np.maximum(radius, np.finfo(float).tiny)  # a multiple of the identity has no direction: any will do
+    larger, smaller = (np.clip(value / scale, smallest, 1 / smallest) for value in (larger, smaller))
+    return larger, smaller, half_difference / radius, c / radius
+
+
+def surface_tensor(surface, uv, balance, power=1.0):
+    """The quasi-harmonic operator's tensor M(t, q), carried to the surface's triangles, (3, m).
+
+    `balance` is t: 1 conformal (the identity), 1/2 the paper's C^-1 (eq. 10), 0 authalic; `power` is q.  The stiffness
+    matrix assembled with it on the surface equals that of M on the plane `uv`.
+    """
+    larger, smaller, cos, sin = squared_stretches(surface, uv)
+    along, across = _powers(larger, smaller, balance, power)
+    aspect = np.sqrt(smaller / larger)
+    return _from_eigenvalues(along * aspect, across / aspect, cos, sin)
+
+
+def plane_tensor(surface, uv, balance, power=1.0):
+    """The same tensor M(t, q) on the triangles of the plane `uv`, (3, m)."""
+    larger, smaller, cos, sin = squared_stretches(surface, uv, side="left")
+    return _from_eigenvalues(*_powers(larger, smaller, balance, power), cos, sin)
+
+
+def scalar_tensor(surface, uv, balance, power=1.0):
+    """The scalar kappa of eq. (15), the square root of det M(t, q), (m,)."""
+    larger, smaller, *_ = squared_stretches(surface, uv)
+    return (larger * smaller) ** (power * (1 - balance) / 2)
+
+
+def _powers(larger, smaller, t, q):
+    # ( det(I)^(t - 1/2) I^(-t) )^q from the eigenvalues of the inverse of I
+    common = (larger * smaller) ** (q * (1 - 2 * t) / 2)
+    return common * larger ** (q * t), common * smaller ** (q * t)
+
+
+def _from_eigenvalues(first, second, cos, sin):
+    mean, half = (first + second) / 2, (first - second) / 2
+    return np.array([mean + half * cos, mean - half * cos, half * sin])

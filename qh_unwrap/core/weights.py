@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Edge weights that discretise div(M grad f) = 0, and the schemes that make them from a map.
+
+Weights are a (2, k) array over `surface.edges` (i, j): row 0 is the weight of j in the equation of i, row 1 the weight
+of i in the equation of j.  In all equations `sum_j w_ij (f_i - f_j) = 0` (eq. 2).
+"""
+
+import numpy as np
+
+from .surface import signed_areas
+from .tensor import plane_tensor, scalar_tensor, squared_stretches, surface_tensor
+
+
+def uniform(surface):
+    """Tutte's weights: every edge 1."""
+    return np.ones((2, len(surface.edges)))
+
+
+def cotangent(surface, tensor=None):
+    """Finite element weights of a tensor (3, m) on the surface's triangles, eq. (12); cotangents for the identity."""
+    x, y = surface.flat[..., 0].T, surface.flat[..., 1].T
+    ex, ey = np.roll(x, -1, axis=0) - x, np.roll(y, -1, axis=0) - y  # edge c runs from corner c to c + 1
+    fx, fy = np.roll(ex, -1, axis=0), np.roll(ey, -1, axis=0)
+    gx, gy = np.roll(ex, -2, axis=0), np.roll(ey, -2, axis=0)
+    if tensor is None:
+        product = fx * gx + fy * gy
+    else:
+        a, b, c = tensor
+        product = b * fx * gx - c * (fx * gy + fy * gx) + a * fy * gy
+    half_edge_weights = product / (-4 * surface.area)
+    w = np.bincount(surface.triangle_edges.T.ravel(), half_edge_weights.ravel(), len(surface.edges))
+    return np.stack([w, w])
+
+
+def mean_value(surface, corners=None, tensor=None):
+    """Mean value weights on the triangles `corners` (m, 3, 2), the surface's own by default.
+
+    `tensor` (3, m) gives appendix A of the paper, (m,) the scalar kappa of eq. (15), None those of Floater 2003.
+    Always positive for positive definite tensors.  Flipped triangles count by their absolute angles.
+    """
+    corners = surface.flat if corners is None else corners
+    edge = np.roll(corners, -1, axis=1) - corners
+    length = np.linalg.norm(edge, axis=2)
+    length = np.maximum(length, 1e-12 * length.max()).T
+    ex, ey = (edge / length.T[..., None])[..., 0].T, (edge / length.T[..., None])[..., 1].T
+    side = np.where(signed_areas(corners) < 0, -1.0, 1.0)
+    # At corner c, between the edge to c + 1 and the edge back to c - 1
+    cos = -(ex * np.roll(ex, 1, axis=0) + ey * np.roll(ey, 1, axis=0))
+    sin = np.maximum(np.abs(ex * np.roll(ey, 1, axis=0) - ey * np.roll(ex, 1, axis=0)), 1e-12)
+    tan_half = np.where(cos > 0, sin / (1 + np.abs(cos)), (1 + np.abs(cos)) / sin)
+    at_start, at_end = (sin, tan_half), (np.roll(sin, -1, axis=0), np.roll(tan_half, -1, axis=0))
+    if tensor is None:
+        parts = [tan_half for _, tan_half in (at_start, at_end)]
+    elif tensor.ndim == 1:
+        parts = [tensor * tan_half for _, tan_half in (at_start, at_end)]
+    else:
+        a, b, c = _in_edge_frame(tensor, ex, ey, side)
+        # Seen from the edge's end its direction turns by half a circle and the normal stays: c changes its sign.
+        parts = [_appendix_a(a, b, c, *at_start), _appendix_a(a, b, -c, *at_end)]
+    return _directed(surface, *(part / length for part in parts))
+
+
+def _in_edge_frame(tensor, ex, ey, side):
+    # The tensor in the frame along each edge whose normal points into the triangle, (3, m) each.
+    a, b, c = tensor
+    nx, ny = -ey * side, ex * side
+    return (
+        a * ex * ex + 2 * c * ex * ey + b * ey * ey,
+        a * nx * nx + 2 * c * nx * ny + b * ny * ny,
+        a * ex * nx + c * (ex * ny + ey * nx) + b * ey * ny,
+    )
+
+
+def _appendix_a(a, b, c, sin, tan_half):
+    return ((a + 2 * b + 2 * c * sin) * tan_half + (a - b) * sin) / 3
+
+
+def _directed(surface, at_start, at_end):
+    # Sum the weights that half-edges (3, m) give to the equations of their start and of their end.
+    start, end = surface.half_edges
+    edge, k = surface.triangle_edges.T.ravel(), len(surface.edges)
+    forward = start < end
+    at_start, at_end = at_start.ravel(), at_end.ravel()
+    return np.stack(
+        [
+            np.bincount(edge, np.where(forward, at_start, at_end), k),
+            np.bincount(edge, np.where(forward, at_end, at_start), k),
+        ]
+    )
+
+
+class Stretch:
+    """The weights of Yoshizawa, Belyaev, Seidel 2004: mean value weights, each w_ij divided by the stretch at j
+    after every solve, for ever.
+    """
+
+    def __init__(self, surface):
+        self.surface = surface
+        self.weights = mean_value(surface)
+
+    def __call__(self, uv):
+        larger, smaller, *_ = squared_stretches(self.surface, uv)
+        area = np.repeat(self.surface.area, 3)
+        corner = self.surface.triangles.ravel()
+        squared = np.repeat((1 / larger + 1 / smaller) / 2, 3)
+        stretch = np.sqrt(np.bincount(corner, area * squared) / np.bincount(corner, area))
+        i, j = self.surface.edges.T
+        self.weights = self.weights / np.stack([stretch[j], stretch[i]])
+        return self.weights
+
+
+def scheme(surface, settings):
+    """The function that makes the next weights from a map `uv` (n, 2), as the settings choose."""
+    t, q = settings.balance, settings.tensor_power
+    if settings.weights == "COTANGENT":
+        return lambda uv: cotangent(surface, surface_tensor(surface, uv, t, q))
+    if settings.weights == "MEAN_VALUE":
+        return lambda uv: mean_value(surface, uv[surface.triangles], plane_tensor(surface, uv, t, q))
+    if settings.weights == "MEAN_VALUE_SCALAR":
+        return lambda uv: mean_value(surface, uv[surface.triangles], scalar_tensor(surface, uv, t, q))
+    return Stretch(surface)
