@@ -7,6 +7,7 @@
 from .distortion import Distortion, distortion
 from .errors import UnwrapError
 from .quasi_harmonic import State
+from .refinement import has_positive_weights, refine_obtuse
 from .settings import Settings
 from .surface import Surface
 from .unwrapping import Report, Result, unwrap, unwrap_steps
@@ -20,6 +21,8 @@ __all__ = [
     "Surface",
     "UnwrapError",
     "distortion",
+    "has_positive_weights",
+    "refine_obtuse",
     "unwrap",
     "unwrap_steps",
 ]

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from .errors import BoundaryError, PinError, UVError
 from .initial import project
-from .surface import edge_lengths, perimeter
+from .surface import edge_lengths
 
 _BOW = 0.02  # how far a side bulges, by its length, where it must not be straight
 _CORNER_CANDIDATES = 40
@@ -190,7 +190,9 @@ def _kept(surface, uv, pinned):
         raise BoundaryError("the UVs' outline encloses no area: choose another boundary")
     crossings = count_crossings([uv[loop] for loop in surface.loops])
     if crossings:
-        raise BoundaryError(f"the UVs' outline crosses itself {crossings} times: untangle it, or choose another boundary")
+        raise BoundaryError(
+            f"the UVs' outline crosses itself {crossings} times: untangle it, or choose another boundary"
+        )
     return held if pinned is None else held | pinned
 
 

@@ -41,7 +41,8 @@ class Distortion:
 def measure(surface, uv):
     """The `Distortion` of the map `uv` (n, 2) of a `Surface`."""
     larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
-    share = surface.area / surface.area.sum()
+    share = np.where(surface.degenerate, 0, surface.area)
+    share /= share.sum()
     stretch = (1 / larger + 1 / smaller) / 2
     angle = np.sqrt(larger / smaller)
     log_area = (np.log(larger) + np.log(smaller)) / 2

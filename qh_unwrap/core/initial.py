@@ -43,13 +43,18 @@ def project(surface):
     """Projection on the least-squares plane, seen from the side that its faces turn to, (n, 2)."""
     corners = surface.vertices[surface.triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    share = np.linalg.norm(normal, axis=1)
-    centres = corners.mean(axis=1)
-    centres = centres - share @ centres / share.sum()
-    axes = np.linalg.eigh(centres.T @ (share[:, None] * centres))[1]  # the least extent comes first
+    share = np.linalg.norm(normal, axis=1) / np.linalg.norm(normal, axis=1).sum()
+    corners = corners - share @ corners.mean(axis=1)
+    # The second moments of a triangle are those of its corners and of three times its centre, each a twelfth.
+    points = np.vstack([*corners.transpose(1, 0, 2), corners.sum(axis=1)])
+    axes = np.linalg.eigh(points.T @ (np.tile(share, 4)[:, None] * points))[1]  # the least extent comes first
     across, right = axes[:, 0], axes[:, 2]
     if normal.sum(axis=0) @ across < 0:
         across = -across
+    # Of the two ways round, the one with the farther end to the right: it turns with the surface.
+    extent = surface.vertices @ right
+    if extent.max() < -extent.min():
+        right = -right
     return surface.vertices @ np.column_stack([right, np.cross(across, right)])
 
 

@@ -22,6 +22,7 @@ class Island:
     corner_vertex: np.ndarray  # (c,) island vertex of each of these corners
     vertices: np.ndarray  # (n,) mesh vertex of each island vertex
     triangles: np.ndarray  # (t, 3) island vertices
+    triangle_corners: np.ndarray  # (t, 3) the same as mesh corners
 
 
 def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_triangles):
@@ -37,11 +38,7 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
     directions.
     """
     corner_count, face_count = len(corner_vertex), len(face_start)
-    face_end = np.append(face_start[1:], corner_count)
-    corner_face = np.repeat(np.arange(face_count), face_end - face_start)
-    following = np.arange(1, corner_count + 1)
-    following[face_end - 1] = face_start
-
+    corner_face, following = _around_faces(face_start, corner_count)
     one, other = _across_edges(corner_vertex, corner_edge, seam, np.flatnonzero(selected[corner_face]))
     uv_vertex = _components(
         corner_count, np.concatenate([one, following[one]]), np.concatenate([following[other], other])
@@ -65,9 +62,30 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
                 corner_vertex=inverse,
                 vertices=corner_vertex[own_corners[first]],
                 triangles=island_vertex[corner_triangles[own_triangles]],
+                triangle_corners=corner_triangles[own_triangles],
             )
         )
     return islands
+
+
+def cuts(corner_vertex, corner_edge, face_start, edge_count, uv, tolerance=1e-6):
+    """The edges (e,) bool where two faces meet in space and their corners' UVs (c, 2) do not."""
+    corners = np.arange(len(corner_vertex))
+    _, following = _around_faces(face_start, len(corners))
+    one, other = _across_edges(corner_vertex, corner_edge, np.zeros(edge_count, dtype=bool), corners)
+    gaps = np.abs(np.hstack([uv[one] - uv[following[other]], uv[following[one]] - uv[other]])).max(axis=1)
+    cut = np.zeros(edge_count, dtype=bool)
+    cut[corner_edge[one[gaps > tolerance]]] = True
+    return cut
+
+
+def _around_faces(face_start, corner_count):
+    """The face of each corner, and the corner that follows it around that face."""
+    face_end = np.append(face_start[1:], corner_count)
+    corner_face = np.repeat(np.arange(len(face_start)), face_end - face_start)
+    following = np.arange(1, corner_count + 1)
+    following[face_end - 1] = face_start
+    return corner_face, following
 
 
 def _across_edges(corner_vertex, corner_edge, seam, corners):

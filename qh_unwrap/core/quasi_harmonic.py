@@ -77,4 +77,5 @@ def energy(surface, uv, balance):
     angle = (np.sqrt(larger / smaller) + np.sqrt(smaller / larger)) / 2
     area = (np.sqrt(larger * smaller) + 1 / np.sqrt(larger * smaller)) / 2
     p, r = np.clip(4 * balance, 0.05, 1), min(1.0, 4 / 3 * (1 - balance))
-    return float(surface.area @ (angle**p * area**r) / surface.area.sum())
+    share = np.where(surface.air | surface.degenerate, 0, surface.area)
+    return float(share @ (angle**p * area**r) / share.sum())

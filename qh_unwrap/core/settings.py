@@ -20,9 +20,7 @@ class Choice:
 
 
 def _setting(default, label, description, *, range=None, soft_range=None, choices=()):
-    metadata = dict(
-        label=label, description=description, range=range, soft_range=soft_range or range, choices=choices
-    )
+    metadata = dict(label=label, description=description, range=range, soft_range=soft_range or range, choices=choices)
     return dataclasses.field(default=default, metadata=metadata)
 
 
@@ -32,13 +30,15 @@ _INITIAL = (
     Choice("HARMONIC", "Harmonic", "Angle preserving with the boundary held (cotangent weights)"),
     Choice("MEAN_VALUE", "Mean Value", "Free of flips on a convex boundary, whatever the mesh (Floater 2003)"),
     Choice("CONFORMAL", "Conformal", "Angle preserving with a natural boundary (spectral conformal map)"),
-    Choice("PROJECTION", "Projection", "Flat view along the average normal; foldovers correct themselves"),
+    Choice("PROJECTION", "Projection", "Flat view on the plane of best fit; foldovers correct themselves"),
     Choice("CURRENT", "Current UVs", "Start from the UVs that the mesh has"),
 )
 
 _BOUNDARY = (
     Choice("CIRCLE", "Circle", "The outline becomes a circle"),
-    Choice("RECTANGLE", "Rectangle", "The outline becomes a rectangle; pin four outline vertices to choose its corners"),
+    Choice(
+        "RECTANGLE", "Rectangle", "The outline becomes a rectangle; pin four outline vertices to choose its corners"
+    ),
     Choice("OUTLINE", "Convex Outline", "The outline becomes the convex hull of its flat view"),
     Choice("KEEP", "Keep", "The outline stays where the UVs have it, and so do pinned vertices"),
 )
@@ -73,15 +73,16 @@ class Settings:
     balance: float = _setting(
         0.25,
         "Balance",
-        "From even areas (0) to true angles (1). 0.25 distorts textures least; 0.5 is the published"
-        " quasi-harmonic map",
+        "From even areas (0) to true angles (1). 0.25 distorts textures least; 0.5 is the published quasi-harmonic map",
         range=(0.0, 1.0),
     )
     weights: str = _setting("COTANGENT", "Weights", "How the improvement is computed", choices=_WEIGHTS)
     initial: str = _setting("AUTO", "Start", "The map that is improved", choices=_INITIAL)
     repair: bool = _setting(True, "Repair Flips", "Turn flipped faces over (cotangent weights)")
     fill_holes: bool = _setting(
-        True, "Fill Holes", "Treat holes as if they were closed, so that they keep their shape; else they move freely"
+        True,
+        "Fill Holes",
+        "Treat holes as if they were closed, so that they keep their shape; else they take any shape",
     )
     tensor_power: float = _setting(
         1.0,

@@ -9,8 +9,10 @@ from scipy.sparse.csgraph import connected_components
 
 from . import errors
 
-# A triangle lower than this part of its longest edge is given that height, so that nothing divides by zero.
-FLATTEST = 1e-6
+# A triangle lower than this part of its longest edge has no area, for all that single precision can tell.
+_FLATTEST = 1e-6
+# It is laid out with this part as its height: enough to stay valid in a map, too little to bend it.
+_THICKENED = 1e-2
 
 
 class Surface:
@@ -30,6 +32,7 @@ class Surface:
     flat : (m, 3, 2), the corners of every triangle laid isometrically in the plane, counter-clockwise
     area : (m,), positive, in the scale of `vertices`
     degenerate : (m,), True where the surface's triangle has no area and `flat` is made up
+    air : (m,), True for triangles that are no part of the surface, but of the plane around it
     on_boundary : (3 m,), True for half-edges without a neighbour
     loops : list of boundary loops, the longest first, each in the direction of its triangles' winding
 
@@ -47,6 +50,7 @@ class Surface:
         self._check_topology()
         self.flat, self.degenerate = _isometric_corners(self.vertices[triangles])
         self.area = signed_areas(self.flat)
+        self.air = np.zeros(len(triangles), bool)
 
     def _check_triangles(self, n):
         triangles = self.triangles
@@ -157,15 +161,26 @@ class Surface:
         total = np.bincount(self.triangles.ravel(), weights=angles.ravel(), minlength=len(self.vertices))
         return np.pi - total[self.loops[0]]
 
-    def filled(self):
-        """The surface with every hole (all loops but the longest) closed by a fan; its first triangles are ours."""
+    def filled(self, air=False):
+        """The surface with every hole (all loops but the longest) closed by a fan; its first triangles are ours.
+
+        With `air` the fans belong to the plane, and take whatever shape the layout gives them.
+        """
         holes = self.loops[1:]
         if not holes:
             return self
         n = len(self.vertices)
         centres = [self.vertices[loop].mean(axis=0) for loop in holes]
         fans = [np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), n + i)]) for i, loop in enumerate(holes)]
-        return Surface(np.vstack([self.vertices, *centres]), np.vstack([self.triangles, *fans]))
+        closed = Surface(np.vstack([self.vertices, *centres]), np.vstack([self.triangles, *fans]))
+        closed.air[len(self.triangles) :] = air
+        return closed
+
+    def shapes_in(self, uv):
+        """The corners (m, 3, 2) of the surface's triangles laid flat, and of air where the layout has it."""
+        if not self.air.any():
+            return self.flat
+        return np.where(self.air[:, None, None], uv[self.triangles], self.flat)
 
 
 def _checked_arrays(vertices, triangles):
@@ -211,14 +226,14 @@ def _isometric_corners(corners):
     rows = np.arange(m)
     order = (base[:, None] + np.arange(3)) % 3
     a, b, c = (corners[rows, order[:, k]] for k in range(3))
-    longest = np.maximum(length[rows, base], FLATTEST * length.mean())
+    longest = np.maximum(length[rows, base], _FLATTEST * length.mean())
     along = np.einsum("ij,ij->i", b - a, c - a) / longest
     height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / longest
-    degenerate = height < FLATTEST * longest
+    degenerate = height < _FLATTEST * longest
     flat = np.zeros((m, 3, 2))
     flat[rows, order[:, 1], 0] = longest
     flat[rows, order[:, 2], 0] = along
-    flat[rows, order[:, 2], 1] = np.maximum(height, FLATTEST * longest)
+    flat[rows, order[:, 2], 1] = np.where(degenerate, _THICKENED * longest, height)
     return flat, degenerate
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from .surface import signed_areas
 
-_SMALLEST = 1e-12  # squared stretches are kept within this and its inverse
+_SMALLEST = 1e-12  # squared stretches, and their ratios, are kept within this and its inverse
 
 
 def edge_matrix(corners):
@@ -36,7 +36,8 @@ def jacobian(surface, uv):
 
 def area_scale(surface, uv):
     """The layout's area by the surface's, never zero; dividing squared stretches by it makes them free of scale."""
-    return max(abs(signed_areas(uv[surface.triangles]).sum()) / surface.area.sum(), 1e-300)
+    solid = ~surface.air
+    return max(abs(signed_areas(uv[surface.triangles])[solid].sum()) / surface.area[solid].sum(), 1e-300)
 
 
 def squared_stretches(surface, uv, side="right", smallest=_SMALLEST):
@@ -56,6 +57,7 @@ def squared_stretches(surface, uv, side="right", smallest=_SMALLEST):
     smaller = det / np.maximum(larger, np.finfo(float).tiny)  # not mean - radius, which cancels
     radius = np.maximum(radius, np.finfo(float).tiny)  # a multiple of the identity has no direction: any will do
     larger, smaller = (np.clip(value / scale, smallest, 1 / smallest) for value in (larger, smaller))
+    smaller = np.maximum(smaller, smallest * larger)
     return larger, smaller, half_difference / radius, c / radius
 
 
@@ -68,19 +70,19 @@ def surface_tensor(surface, uv, balance, power=1.0):
     larger, smaller, cos, sin = squared_stretches(surface, uv)
     along, across = _powers(larger, smaller, balance, power)
     aspect = np.sqrt(smaller / larger)
-    return _from_eigenvalues(along * aspect, across / aspect, cos, sin)
+    return _from_eigenvalues(surface, along * aspect, across / aspect, cos, sin)
 
 
 def plane_tensor(surface, uv, balance, power=1.0):
     """The same tensor M(t, q) on the triangles of the plane `uv`, (3, m)."""
     larger, smaller, cos, sin = squared_stretches(surface, uv, side="left")
-    return _from_eigenvalues(*_powers(larger, smaller, balance, power), cos, sin)
+    return _from_eigenvalues(surface, *_powers(larger, smaller, balance, power), cos, sin)
 
 
 def scalar_tensor(surface, uv, balance, power=1.0):
     """The scalar kappa of eq. (15), the square root of det M(t, q), (m,)."""
     larger, smaller, *_ = squared_stretches(surface, uv)
-    return (larger * smaller) ** (power * (1 - balance) / 2)
+    return np.where(surface.air, 1.0, (larger * smaller) ** (power * (1 - balance) / 2))
 
 
 def _powers(larger, smaller, t, q):
@@ -89,6 +91,8 @@ def _powers(larger, smaller, t, q):
     return common * larger ** (q * t), common * smaller ** (q * t)
 
 
-def _from_eigenvalues(first, second, cos, sin):
+def _from_eigenvalues(surface, first, second, cos, sin):
+    # Air is as good as it lies: its tensor is the identity.
+    first, second = np.where(surface.air, 1.0, [first, second])
     mean, half = (first + second) / 2, (first - second) / 2
     return np.array([mean + half * cos, mean - half * cos, half * sin])

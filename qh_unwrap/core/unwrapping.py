@@ -90,7 +90,7 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None):
     given = None if uv is None else uv * mirror
 
     held, values, warnings = held_vertices(surface, settings, given, pinned)
-    solid = surface.filled() if settings.fill_holes and settings.boundary != "KEEP" else surface
+    solid = surface if settings.boundary == "KEEP" else surface.filled(air=not settings.fill_holes)
     added = len(solid.vertices) - len(surface.vertices)
     dirichlet = Dirichlet(solid.vertices, solid.edges, np.pad(held, (0, added)), np.pad(values, ((0, added), (0, 0))))
     start = initial_map(solid, _chosen_start(settings, surface, given), dirichlet, _extended(surface, given, added))

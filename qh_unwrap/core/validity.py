@@ -40,7 +40,7 @@ class Repair:
 
     def invalid(self, uv):
         """The triangles that are not positive though they could be, (m,) bool."""
-        return (orientation(uv, self.surface.triangles) <= 0) & ~self.surface.degenerate
+        return (orientation(uv, self.surface.triangles) <= 0) & ~(self.surface.degenerate | self.surface.air)
 
     def solve(self, weights, previous):
         """Solve with symmetric `weights` (2, k); where the result flips, again with raised weights.

@@ -16,9 +16,13 @@ def uniform(surface):
     return np.ones((2, len(surface.edges)))
 
 
-def cotangent(surface, tensor=None):
-    """Finite element weights of a tensor (3, m) on the surface's triangles, eq. (12); cotangents for the identity."""
-    x, y = surface.flat[..., 0].T, surface.flat[..., 1].T
+def cotangent(surface, tensor=None, corners=None):
+    """Finite element weights on the triangles `corners` (m, 3, 2), the surface's own by default, eq. (12).
+
+    `tensor` (3, m) is constant on each triangle; None is the identity, which gives the cotangents.
+    """
+    corners = surface.flat if corners is None else corners
+    x, y = corners[..., 0].T, corners[..., 1].T
     ex, ey = np.roll(x, -1, axis=0) - x, np.roll(y, -1, axis=0) - y  # edge c runs from corner c to c + 1
     fx, fy = np.roll(ex, -1, axis=0), np.roll(ey, -1, axis=0)
     gx, gy = np.roll(ex, -2, axis=0), np.roll(ey, -2, axis=0)
@@ -27,12 +31,13 @@ def cotangent(surface, tensor=None):
     else:
         a, b, c = tensor
         product = b * fx * gx - c * (fx * gy + fy * gx) + a * fy * gy
-    half_edge_weights = product / (-4 * surface.area)
+    area = np.abs(signed_areas(corners))
+    half_edge_weights = product / (-4 * np.maximum(area, 1e-12 * area.max()))
     w = np.bincount(surface.triangle_edges.T.ravel(), half_edge_weights.ravel(), len(surface.edges))
     return np.stack([w, w])
 
 
-def mean_value(surface, corners=None, tensor=None):
+def mean_value(surface, tensor=None, corners=None):
     """Mean value weights on the triangles `corners` (m, 3, 2), the surface's own by default.
 
     `tensor` (3, m) gives appendix A of the paper, (m,) the scalar kappa of eq. (15), None those of Floater 2003.
@@ -41,8 +46,10 @@ def mean_value(surface, corners=None, tensor=None):
     corners = surface.flat if corners is None else corners
     edge = np.roll(corners, -1, axis=1) - corners
     length = np.linalg.norm(edge, axis=2)
-    length = np.maximum(length, 1e-12 * length.max()).T
-    ex, ey = (edge / length.T[..., None])[..., 0].T, (edge / length.T[..., None])[..., 1].T
+    shortest = max(1e-12 * length.max(), np.finfo(float).tiny)
+    edge[length < shortest] = [shortest, 0]  # collapsed edges: any direction will do
+    length = np.maximum(length, shortest).T
+    ex, ey = edge[..., 0].T / length, edge[..., 1].T / length
     side = np.where(signed_areas(corners) < 0, -1.0, 1.0)
     # At corner c, between the edge to c + 1 and the edge back to c - 1
     cos = -(ex * np.roll(ex, 1, axis=0) + ey * np.roll(ey, 1, axis=0))
@@ -113,9 +120,9 @@ def scheme(surface, settings):
     """The function that makes the next weights from a map `uv` (n, 2), as the settings choose."""
     t, q = settings.balance, settings.tensor_power
     if settings.weights == "COTANGENT":
-        return lambda uv: cotangent(surface, surface_tensor(surface, uv, t, q))
+        return lambda uv: cotangent(surface, surface_tensor(surface, uv, t, q), surface.shapes_in(uv))
     if settings.weights == "MEAN_VALUE":
-        return lambda uv: mean_value(surface, uv[surface.triangles], plane_tensor(surface, uv, t, q))
+        return lambda uv: mean_value(surface, plane_tensor(surface, uv, t, q), uv[surface.triangles])
     if settings.weights == "MEAN_VALUE_SCALAR":
-        return lambda uv: mean_value(surface, uv[surface.triangles], scalar_tensor(surface, uv, t, q))
+        return lambda uv: mean_value(surface, scalar_tensor(surface, uv, t, q), uv[surface.triangles])
     return Stretch(surface)

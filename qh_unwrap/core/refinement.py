@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splitting of obtuse triangles at their longest edges, so that the cotangent weights are positive (section 6)."""
+
+import numpy as np
+
+from .surface import Surface, corner_angles
+from .weights import cotangent
+
+_NEGATIVE = -1e-9
+
+
+def refine_obtuse(surface, limit=16):
+    """Split longest edges until no inner edge has a negative cotangent weight.
+
+    Parameters
+    ----------
+    surface : Surface
+    limit : stop when there are this many times as many triangles
+
+    Returns the refined `Surface` and, for each of its triangles, the triangle it was cut from, (m',).  The original
+    vertices come first, so `uv[:n]` leads back.  `has_positive_weights` tells whether the limit was met.
+
+    Rivara's bisection, which the paper names, halves these edges.  Halves of an obtuse triangle contain triangles
+    similar to it, so that a third of all triangles stays obtuse however long one goes on.  An edge with a negative
+    weight is split here where the heights of its two triangles meet it, which ends far more often; and each round
+    splits edges that share no triangle, so that nothing has to be split along.
+    """
+    n = len(surface.triangles)
+    parents = np.arange(n)
+    while len(surface.triangles) <= limit * n:
+        angle_sum, at = _opposite(surface)
+        angle_sum[~negative_edges(surface)] = 0
+        chosen = _worst_of_both_triangles(surface, angle_sum)
+        if not chosen.any():
+            break
+        surface, origin = _split(surface, chosen, at)
+        parents = parents[origin]
+    return surface, parents
+
+
+def has_positive_weights(surface):
+    """Whether all cotangent weights between inner neighbours are positive: then a harmonic map with a convex boundary
+    has no flips.  For quasi-harmonic maps their tensors must also be nearly multiples of the identity.
+    """
+    return not negative_edges(surface).any()
+
+
+def negative_edges(surface):
+    """The inner edges with a negative cotangent weight, (k,) bool; those of the boundary enter no equation."""
+    negative = cotangent(surface)[0] < _NEGATIVE
+    negative[surface.half_edge_edges[surface.on_boundary]] = False
+    return negative
+
+
+def _opposite(surface):
+    """For every edge the sum of the angles that face it, and where along it the heights meet it on average."""
+    edge = surface.half_edge_edges
+    angle = np.roll(corner_angles(surface.flat), -2, axis=1).T.ravel()
+    third = np.roll(surface.triangles.T, -2, axis=0).ravel()
+    start, end = surface.vertices[surface.edges[edge]].transpose(1, 0, 2)
+    along = end - start
+    foot = np.einsum("ij,ij->i", surface.vertices[third] - start, along)
+    foot /= np.maximum(np.einsum("ij,ij->i", along, along), np.finfo(float).tiny)
+    total = np.bincount(edge, angle)
+    return total, np.clip(np.bincount(edge, angle * foot) / total, 0.1, 0.9)
+
+
+def _worst_of_both_triangles(surface, badness):
+    """Edges of positive badness that no triangle of theirs has a worse one than, (k,) bool."""
+    rank = np.empty(len(badness), dtype=np.int64)
+    rank[np.argsort(badness, kind="stable")] = np.arange(len(badness))
+    own = rank[surface.triangle_edges]
+    wins = np.bincount(surface.triangle_edges.ravel(), (own == own.max(axis=1, keepdims=True)).ravel())
+    return (badness > 0) & (wins == np.bincount(surface.triangle_edges.ravel()))
+
+
+def _split(surface, chosen, at):
+    """Split the `chosen` edges, of which a triangle has at most one; also tells the triangles' origins."""
+    start, end = surface.vertices[surface.edges[chosen]].transpose(1, 0, 2)
+    new_vertex = np.full(len(chosen), -1)
+    new_vertex[chosen] = len(surface.vertices) + np.arange(len(start))
+    vertices = np.vstack([surface.vertices, start + at[chosen, None] * (end - start)])
+
+    corner = np.argmax(chosen[surface.triangle_edges], axis=1)[:, None]  # where the split edge begins
+    rotated = np.take_along_axis(surface.triangles, (corner + np.arange(3)) % 3, axis=1)
+    middle = new_vertex[np.take_along_axis(surface.triangle_edges, corner, axis=1)[:, 0]]
+    cut = middle >= 0
+    (a, b, c), p = rotated[cut].T, middle[cut]
+    whole, halved = np.flatnonzero(~cut), np.flatnonzero(cut)
+    triangles = np.vstack([surface.triangles[whole], np.column_stack([a, p, c]), np.column_stack([p, b, c])])
+    return Surface(vertices, triangles), np.concatenate([whole, halved, halved])

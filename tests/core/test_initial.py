@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import numpy as np
+import pytest
+
+from qh_unwrap.core import Surface, distortion
+from qh_unwrap.core.boundary import enclosed_area
+from qh_unwrap.core.initial import conformal, fit, project
+from qh_unwrap.core.surface import signed_areas
+
+from . import shapes
+
+
+def cone(seed):
+    """A developable patch: three quarters of a disk rolled to a cone."""
+    vertices, triangles = shapes.random_disk(seed)
+    x, y, _ = vertices.T + np.array([[1.5], [0], [0]])
+    radius, angle = np.hypot(x, y), np.arctan2(y, x) * 4 / 3
+    tilt = 3 / 4
+    return (
+        np.column_stack([tilt * radius * np.cos(angle), tilt * radius * np.sin(angle), np.sqrt(1 - tilt**2) * radius]),
+        triangles,
+        np.column_stack([x, y]),
+    )
+
+
+def test_conformal_map_of_a_flat_patch_is_a_similarity():
+    vertices, triangles = shapes.random_disk(1)
+    measured = distortion(vertices @ shapes.rotation(3).T, triangles, conformal(Surface(vertices, triangles)))
+    assert measured.symmetric_dirichlet == pytest.approx(1, abs=1e-9)
+    assert measured.flips == 0
+
+
+def test_conformal_map_keeps_angles_and_orientation_of_a_curved_patch():
+    vertices, triangles = shapes.bump(2, inner=1500, outer=120)
+    surface = Surface(vertices, triangles)
+    measured = distortion(vertices, triangles, conformal(surface))
+    assert measured.angle < 1.05
+    assert measured.flips == 0
+
+
+def test_conformal_map_of_nearly_developable_triangles():
+    vertices, triangles, flat = cone(4)
+    measured = distortion(vertices, triangles, conformal(Surface(vertices, triangles)))
+    assert measured.angle < distortion(vertices, triangles, flat).angle + 1e-6
+
+
+def test_conformal_map_with_holes():
+    vertices, triangles = shapes.ring()
+    uv = conformal(Surface(vertices, triangles))
+    assert distortion(vertices, triangles, uv).symmetric_dirichlet == pytest.approx(1, abs=1e-9)
+
+
+def test_projection_sees_the_front_of_a_flat_patch():
+    vertices, triangles = shapes.random_disk(5)
+    surface = Surface(vertices @ shapes.rotation(6).T + 4, triangles)
+    uv = project(surface)
+    assert (signed_areas(uv[triangles]) > 0).all()
+    assert distortion(vertices, triangles, uv).symmetric_dirichlet == pytest.approx(1, abs=1e-9)
+
+
+def test_fit_undoes_similarities_and_mirrors():
+    rng = np.random.default_rng(7)
+    points = rng.random((20, 2))
+    chosen = np.arange(20) < 6
+    for mirror in (1, -1):
+        targets = 3 * (points * [mirror, 1]) @ [[0.8, 0.6], [-0.6, 0.8]] + 2
+        np.testing.assert_allclose(fit(points, chosen, targets), targets, atol=1e-12)
+    np.testing.assert_allclose(fit(np.zeros((20, 2)), chosen, targets)[0], targets[chosen].mean(axis=0))
+    assert enclosed_area(np.array([[0, 0], [2, 0], [2, 1.0], [0, 1]])) == 2

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import numpy as np
+from hypothesis import given
+from scipy.sparse import coo_array
+from scipy.sparse.linalg import splu
+
+from qh_unwrap.core import Surface
+from qh_unwrap.core.solver import Dirichlet, System, nested_dissection
+from qh_unwrap.core.weights import cotangent, mean_value
+
+from . import shapes
+from .test_tensor import seeds
+
+
+@given(seeds)
+def test_solutions_equal_dense_ones(seed):
+    surface = Surface(*shapes.bump(seed))
+    n = len(surface.vertices)
+    rng = np.random.default_rng(seed)
+    held = np.zeros(n, bool)
+    held[surface.loops[0]] = True
+    held[rng.integers(n, size=3)] = True
+    values = rng.random((n, 2))
+    dirichlet = Dirichlet(surface.vertices, surface.edges, held, values)
+    for weights in (cotangent(surface), mean_value(surface)):
+        matrix = np.zeros((n, n))
+        i, j = surface.edges.T
+        matrix[i, j], matrix[j, i] = -weights
+        matrix -= np.diag(matrix.sum(axis=1))
+        expected = values.copy()
+        expected[~held] = np.linalg.solve(matrix[~held][:, ~held], -matrix[~held][:, held] @ values[held])
+        np.testing.assert_allclose(dirichlet.solve(weights), expected, atol=1e-10)
+        np.testing.assert_allclose(dirichlet.diagonal(weights), np.diag(matrix), rtol=1e-12)
+
+
+def test_everything_held():
+    surface = Surface(*shapes.grid(1, 1))
+    values = np.random.default_rng(0).random((4, 2))
+    dirichlet = Dirichlet(surface.vertices, surface.edges, np.ones(4, bool), values)
+    np.testing.assert_array_equal(dirichlet.solve(cotangent(surface)), values)
+
+
+def test_complex_systems():
+    surface = Surface(*shapes.bump(1))
+    n = len(surface.vertices)
+    rng = np.random.default_rng(1)
+    off = rng.random(len(surface.edges)) + 1j * rng.random(len(surface.edges))
+    diagonal = np.full(n, 20.0 + 0j)
+    matrix = np.diag(diagonal)
+    i, j = surface.edges.T
+    matrix[i, j], matrix[j, i] = off, off.conj()
+    rhs = rng.random(n) + 0j
+    solve = System(surface.vertices, surface.edges).factor(off, off.conj(), diagonal)
+    np.testing.assert_allclose(solve(rhs), np.linalg.solve(matrix, rhs), atol=1e-12)
+
+
+def test_the_order_is_a_permutation_with_less_fill_than_the_generic_one():
+    vertices, triangles = shapes.random_disk(3, inner=6000, outer=200)
+    surface = Surface(vertices, triangles)
+    order = nested_dissection(surface.vertices, surface.edges)
+    n = len(order)
+    assert (np.sort(order) == np.arange(n)).all()
+    i, j = surface.edges.T
+    laplacian = coo_array((-np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsc()
+    laplacian.setdiag(1.1 - laplacian.sum(axis=0))
+
+    def fill(matrix, ordering):
+        options = {"SymmetricMode": True}
+        return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options=options).nnz
+
+    assert fill(laplacian[order][:, order].tocsc(), "NATURAL") < 0.8 * fill(laplacian, "COLAMD")
+
+
+def test_orders_of_tiny_and_edgeless_graphs():
+    for n in range(6):
+        order = nested_dissection(np.random.default_rng(n).random((n, 3)), np.zeros((0, 2), int))
+        assert sorted(order.tolist()) == list(range(n))
+    same = np.zeros((50, 3))
+    chain = np.column_stack([np.arange(49), np.arange(1, 50)])
+    assert sorted(nested_dissection(same, chain).tolist()) == list(range(50))
