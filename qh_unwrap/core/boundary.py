@@ -9,6 +9,7 @@ from scipy.spatial import ConvexHull, QhullError
 from .errors import BoundaryError, PinError, UVError
 from .initial import project
 from .surface import edge_lengths
+from .validity import count_crossings, enclosed_area
 
 _BOW = 0.02  # how far a side bulges, by its length, where it must not be straight
 _CORNER_CANDIDATES = 40
@@ -199,35 +200,3 @@ def _kept(surface, uv, pinned):
 def outer_loop(surface, uv):
     """The loop that encloses the largest area in the plane."""
     return max(surface.loops, key=lambda loop: abs(enclosed_area(uv[loop])))
-
-
-def enclosed_area(points):
-    """Signed area within the closed polygon (n, 2), positive counter-clockwise."""
-    (x, y), (next_x, next_y) = (points - points[0]).T, (np.roll(points, -1, axis=0) - points[0]).T
-    return 0.5 * (x * next_y - y * next_x).sum()
-
-
-def count_crossings(polygons):
-    """How many pairs of sides of the closed polygons, each (n, 2), properly cross."""
-    start = np.concatenate(polygons)
-    end = np.concatenate([np.roll(points, -1, axis=0) for points in polygons])
-    order = np.argsort(np.minimum(start[:, 0], end[:, 0]), kind="stable")
-    start, end = start[order], end[order]
-    left, right = np.minimum(start[:, 0], end[:, 0]), np.maximum(start[:, 0], end[:, 0])
-    first = np.arange(len(start))
-    crossings = 0
-    # Sides sorted by their left ends: compare each with its followers as long as those begin before it ends.
-    for ahead in range(1, len(start)):
-        first = first[first + ahead < len(start)]
-        first = first[left[first + ahead] <= right[first]]
-        if not len(first):
-            break
-        second = first + ahead
-        apart = _side_of(start[first], end[first], start[second]) * _side_of(start[first], end[first], end[second]) < 0
-        across = _side_of(start[second], end[second], start[first]) * _side_of(start[second], end[second], end[first])
-        crossings += int(np.sum(apart & (across < 0)))
-    return crossings
-
-
-def _side_of(a, b, c):
-    return np.sign((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])

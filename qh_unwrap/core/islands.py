@@ -45,6 +45,7 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
     )
     face_island = _components(face_count, corner_face[one], corner_face[other])
 
+    corner_triangles = _without_doubled_diagonals(corner_triangles, following, uv_vertex)
     faces = _by_island(np.flatnonzero(selected), face_island)
     corners = _by_island(np.flatnonzero(selected[corner_face]), face_island[corner_face])
     triangle_face = corner_face[corner_triangles[:, 0]]
@@ -95,6 +96,36 @@ def _across_edges(corner_vertex, corner_edge, seam, corners):
     one, other = inner[np.argsort(corner_edge[inner], kind="stable")].reshape(-1, 2).T
     opposite = corner_vertex[one] != corner_vertex[other]
     return one[opposite], other[opposite]
+
+
+def _without_doubled_diagonals(triangles, following, uv_vertex):
+    """Triangles (t, 3) of the same faces, of which no two have a diagonal between the same two vertices.
+
+    Faces are triangulated one by one, so where two of them share several edges in a row, both may be cut along the
+    same diagonal, and the triangles beside it would lie on top of each other.  Such diagonals are flipped.
+    """
+    for _ in range(8):
+        halves = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+        low, high = np.sort(uv_vertex[halves], axis=1).T
+        _, edge, uses = np.unique(low * (uv_vertex.max() + 1) + high, return_inverse=True, return_counts=True)
+        is_diagonal = halves[:, 1] != following[halves[:, 0]]
+        doubled = np.flatnonzero(is_diagonal & (uses[edge] > 2))
+        if not len(doubled):
+            break
+        triangles = _flipped(triangles, {tuple(halves[row]): row for row in doubled})
+    return triangles
+
+
+def _flipped(triangles, rows):
+    """The triangles after flipping diagonals, given as {(corner, corner): 3 * triangle + place}, both ways round."""
+    triangles, touched = triangles.copy(), set()
+    for (i, j), row in rows.items():
+        one, other = row // 3, rows[j, i] // 3
+        if not touched & {one, other}:
+            k, h = triangles[one, (row + 2) % 3], triangles[other, (rows[j, i] + 2) % 3]
+            triangles[one], triangles[other] = (h, j, k), (h, k, i)
+            touched |= {one, other}
+    return triangles
 
 
 def _components(count, one, other):

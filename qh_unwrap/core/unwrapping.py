@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .boundary import enclosed_area, held_vertices, outer_loop
+from .boundary import held_vertices, outer_loop
 from .distortion import Distortion, checked_uv, measure
 from .errors import PinError
 from .initial import initial_map
@@ -13,6 +13,7 @@ from .quasi_harmonic import energy, iterate
 from .settings import Settings
 from .solver import Dirichlet
 from .surface import Surface
+from .validity import enclosed_area, is_injective
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +31,15 @@ class Report:
     """The last iteration moved no vertex by more than the tolerance."""
     changes: tuple[float, ...]
     """For every iteration, the largest movement of a vertex by the layout's diameter."""
+    injective: bool
+    """Certified in 32-bit floats: no triangle is flipped and no two overlap."""
     mirrored: bool
     """The given UVs were mirrored and the result is too; flips are counted the other way round."""
     warnings: tuple[str, ...]
 
     def to_dict(self):
         """As plain numbers, lists and dictionaries, without the arrays over triangles."""
-        names = ("iterations", "converged", "mirrored")
+        names = ("iterations", "converged", "injective", "mirrored")
         return {
             "before": self.before and self.before.to_dict(),
             "initial": self.initial.to_dict(),
@@ -109,22 +112,20 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None):
             yield replace(state, uv=state.uv[:n] * mirror)
     chosen = best if best is not None and state.repaired else state
 
-    after = measure(surface, chosen.uv[:n])
-    if mirrored:
-        chosen = replace(chosen, uv=chosen.uv * mirror)
     if surface.degenerate.any():
         warnings += (f"{surface.degenerate.sum()} faces have zero area",)
     report = Report(
         before=None if given is None else measure(surface, given),
         initial=measure(surface, start[:n]),
-        after=after,
+        after=measure(surface, chosen.uv[:n]),
         iterations=len(changes),
         converged=bool(changes) and changes[-1] <= settings.tolerance,
         changes=tuple(changes),
+        injective=is_injective(chosen.uv[:n], surface.triangles, surface.loops),
         mirrored=bool(mirrored),
         warnings=warnings,
     )
-    return Result(chosen.uv[:n], report)
+    return Result(chosen.uv[:n] * mirror, report)
 
 
 def _checked_pins(surface, pinned):

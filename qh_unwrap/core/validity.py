@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which triangles are flipped, and the weights that turn them back."""
+"""Which triangles are flipped, whether a map covers nothing twice, and the weights that turn triangles back."""
 
 from fractions import Fraction
 
@@ -10,22 +10,87 @@ _ROUNDS = 8
 _HALVINGS = 10
 
 
-def orientation(uv, triangles):
-    """1 for triangles that follow their winding, -1 for flipped, 0 for collapsed ones, (m,).
-
-    Decided exactly, for the 32-bit floats that Blender stores.
-    """
-    with np.errstate(over="ignore"):
-        a, b, c = (uv.astype(np.float32).astype(np.float64)[corner] for corner in triangles.T)
+def turn(a, b, c):
+    """1 where the points a, b, c (n, 2) turn left, -1 where they turn right, 0 where they lie on a line: exactly."""
     first = (b - a)[:, 0] * (c - a)[:, 1]
     second = (b - a)[:, 1] * (c - a)[:, 0]
     result = np.sign(first - second).astype(np.int8)
+    # Where the two nearly cancel, rounding decides; then count in fractions (Shewchuk 1997 bounds the error).
     close = np.abs(first - second) <= 1e-15 * (np.abs(first) + np.abs(second))
-    for t in np.flatnonzero(close & (first != 0) & (second != 0)):
-        (ax, ay), (bx, by), (cx, cy) = ([Fraction(value) for value in point[t].tolist()] for point in (a, b, c))
+    for k in np.flatnonzero(close & (first != 0) & (second != 0)):
+        (ax, ay), (bx, by), (cx, cy) = ([Fraction(value) for value in point[k].tolist()] for point in (a, b, c))
         det = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        result[t] = (det > 0) - (det < 0)
+        result[k] = (det > 0) - (det < 0)
     return result
+
+
+def as_stored(uv):
+    """`uv` rounded to the 32-bit floats that Blender keeps."""
+    with np.errstate(over="ignore"):
+        return np.asarray(uv).astype(np.float32).astype(np.float64)
+
+
+def orientation(uv, triangles):
+    """1 for triangles that follow their winding, -1 for flipped, 0 for collapsed ones, (m,), in 32-bit floats."""
+    a, b, c = (as_stored(uv)[corner] for corner in triangles.T)
+    return turn(a, b, c)
+
+
+def is_injective(uv, triangles, loops):
+    """Whether no two points of the surface share a place in 32-bit floats: a certificate, not an estimate.
+
+    If every triangle follows its winding, a place is covered as often as the boundary `loops` wind around it; and that
+    is once or never, where the loops are simple, meet nowhere, and the holes' lie within the outer one.
+    """
+    if (orientation(uv, triangles) <= 0).any():
+        return False
+    polygons = [as_stored(uv)[loop] for loop in loops]
+    # Triangles of positive area leave the outer loop counter-clockwise and the others clockwise, if all are simple.
+    turns_left = [enclosed_area(polygon) > 0 for polygon in polygons]
+    return sum(turns_left) == 1 and count_crossings(polygons, touching=True) == 0
+
+
+def enclosed_area(points):
+    """Signed area within the closed polygon (n, 2), positive counter-clockwise."""
+    (x, y), (next_x, next_y) = (points - points[0]).T, (np.roll(points, -1, axis=0) - points[0]).T
+    return 0.5 * (x * next_y - y * next_x).sum()
+
+
+def count_crossings(polygons, touching=False):
+    """How many pairs of sides of the closed polygons, each (n, 2), properly cross, or also touch, exactly."""
+    start = np.concatenate(polygons)
+    end = np.concatenate([np.roll(points, -1, axis=0) for points in polygons])
+    first_side = np.repeat(np.cumsum([0, *map(len, polygons[:-1])]), [len(points) for points in polygons])
+    last_side = first_side + np.repeat([len(points) - 1 for points in polygons], [len(points) for points in polygons])
+    number = np.arange(len(start))
+    following = np.where(number == last_side, first_side, number + 1)
+
+    axis = int(np.argmax(np.ptp(start, axis=0)))
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = np.argsort(low[:, axis], kind="stable")
+    crossings = 0
+    # Sides sorted by where they begin: compare each with its followers as long as those begin before it ends.
+    place = np.arange(len(order))
+    for ahead in range(1, len(order)):
+        place = place[place + ahead < len(order)]
+        place = place[low[order[place + ahead], axis] <= high[order[place], axis]]
+        if not len(place):
+            break
+        one, other = order[place], order[place + ahead]
+        near = (low[one] <= high[other]).all(axis=1) & (low[other] <= high[one]).all(axis=1)
+        one, other = one[near], other[near]
+        a, b, c, d = start[one], end[one], start[other], end[other]
+        across, back = turn(a, b, c) * turn(a, b, d), turn(c, d, a) * turn(c, d, b)
+        if not touching:
+            crossings += int(np.sum((across < 0) & (back < 0)))
+            continue
+        neighbours = (following[one] == other) | (following[other] == one)
+        crossings += int(np.sum((across <= 0) & (back <= 0) & ~neighbours))
+    if touching:  # and sides that turn back on the one before
+        back = start[following] - start, end[following] - start[following]
+        on_a_line = turn(start, end, end[following]) == 0
+        crossings += int(np.sum(on_a_line & ((back[0] * back[1]).sum(axis=1) <= 0)))
+    return crossings
 
 
 class Repair:

@@ -4,7 +4,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from qh_unwrap.core import Settings, Surface, errors
-from qh_unwrap.core.boundary import count_crossings, held_vertices
+from qh_unwrap.core.boundary import held_vertices
 from qh_unwrap.core.surface import edge_lengths
 
 from . import shapes
@@ -135,22 +135,3 @@ def test_kept_boundaries():
     crossed[[a, b]] = crossed[[b, a]]
     with pytest.raises(errors.BoundaryError, match="crosses itself"):
         held_vertices(surface, Settings(boundary="KEEP"), crossed)
-
-
-def test_crossings_equal_those_of_all_pairs():
-    rng = np.random.default_rng(0)
-
-    def crosses(a, b, c, d):
-        def side(p, q, r):
-            return np.sign((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
-
-        return side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0
-
-    for n in (3, 4, 9, 30):
-        polygon = rng.random((n, 2))
-        ends = np.roll(polygon, -1, axis=0)
-        expected = sum(crosses(polygon[i], ends[i], polygon[k], ends[k]) for i in range(n) for k in range(i))
-        assert count_crossings([polygon]) == expected
-    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
-    assert count_crossings([square, square * 0.5 + 0.1]) == 0
-    assert count_crossings([square, square + 0.5]) == 2

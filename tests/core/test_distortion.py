@@ -5,7 +5,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qh_unwrap.core import distortion, errors
-from qh_unwrap.core.validity import orientation
 
 from . import shapes
 from .test_tensor import seeds
@@ -47,15 +46,6 @@ def test_flips_and_collapses_are_counted_against_the_winding():
     measured = distortion(vertices, triangles, uv)
     assert measured.triangle_orientation[9] == 0 and measured.collapsed >= 1
     assert np.isfinite(measured.l2_stretch)
-
-
-def test_orientation_is_that_of_the_stored_floats():
-    # In double precision counter-clockwise by 1e-10; rounded to 32 bits all three lie on a line.
-    uv = np.array([[0.1, 0.1], [0.7, 0.7], [0.3, 0.3 + 1e-10]])
-    assert orientation(uv, np.array([[0, 1, 2]])) == [0]
-    # An exact sign where doubles cancel: nearly collinear points of very different size
-    uv = np.array([[1e-30, 0], [1.0, 1.0], [2.0, 2.0]])
-    assert orientation(uv, np.array([[0, 1, 2], [1, 0, 2]])).tolist() == [-1, 1]
 
 
 def test_bad_uvs_are_refused():
