@@ -19,7 +19,7 @@ class Choice:
     description: str
 
 
-def _setting(default, label, description, *, range=None, soft_range=None, choices=()):
+def setting(default, label, description, *, range=None, soft_range=None, choices=()):
     metadata = dict(label=label, description=description, range=range, soft_range=soft_range or range, choices=choices)
     return dataclasses.field(default=default, metadata=metadata)
 
@@ -55,42 +55,42 @@ _WEIGHTS = (
 class Settings:
     """How to unwrap.  Values are checked when the object is made; raises `SettingsError`."""
 
-    boundary: str = _setting("CIRCLE", "Boundary", "The shape of the island's outline", choices=_BOUNDARY)
-    aspect: float = _setting(
+    boundary: str = setting("CIRCLE", "Boundary", "The shape of the island's outline", choices=_BOUNDARY)
+    aspect: float = setting(
         1.0,
         "Aspect",
         "Width by height of the rectangle; 0 takes it from the island's own sides",
         range=(0.0, 100.0),
         soft_range=(0.0, 10.0),
     )
-    iterations: int = _setting(
+    iterations: int = setting(
         6,
         "Iterations",
         "At most this many improvements of the initial map; 0 keeps the initial map",
         range=(0, 1000),
         soft_range=(0, 30),
     )
-    balance: float = _setting(
+    balance: float = setting(
         0.25,
         "Balance",
         "From even areas (0) to true angles (1). 0.25 distorts textures least; 0.5 is the published quasi-harmonic map",
         range=(0.0, 1.0),
     )
-    weights: str = _setting("COTANGENT", "Weights", "How the improvement is computed", choices=_WEIGHTS)
-    initial: str = _setting("AUTO", "Start", "The map that is improved", choices=_INITIAL)
-    repair: bool = _setting(True, "Repair Flips", "Turn flipped faces over (cotangent weights)")
-    fill_holes: bool = _setting(
+    weights: str = setting("COTANGENT", "Weights", "How the improvement is computed", choices=_WEIGHTS)
+    initial: str = setting("AUTO", "Start", "The map that is improved", choices=_INITIAL)
+    repair: bool = setting(True, "Repair Flips", "Turn flipped faces over (cotangent weights)")
+    fill_holes: bool = setting(
         True,
         "Fill Holes",
         "Treat holes as if they were closed, so that they keep their shape; else they take any shape",
     )
-    tensor_power: float = _setting(
+    tensor_power: float = setting(
         1.0,
         "Tensor Power",
         "Strength of each improvement, the power of the tensor; 1 is exact for strips, 2 hardly converges",
         range=(0.01, 2.0),
     )
-    tolerance: float = _setting(
+    tolerance: float = setting(
         1e-3,
         "Tolerance",
         "Stop when no vertex moves by more than this part of the layout's size",
@@ -100,10 +100,10 @@ class Settings:
 
     def __post_init__(self):
         for field in dataclasses.fields(self):
-            _check(field, getattr(self, field.name))
+            check(field, getattr(self, field.name))
 
 
-def _check(field, value):
+def check(field, value):
     meta = field.metadata
     if meta["choices"]:
         names = [choice.identifier for choice in meta["choices"]]

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes to arrays, and UVs back, in bulk; writing touches nothing but the UVs it is given."""
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bmesh
+import bpy
+import numpy as np
+
+from ..core import UnwrapError
+
+
+@dataclass(frozen=True)
+class MeshArrays:
+    vertices: np.ndarray  # (n, 3) float64, with the object's scale
+    corner_vertex: np.ndarray  # (c,)
+    corner_edge: np.ndarray  # (c,)
+    face_start: np.ndarray  # (f,) first corner of each face
+    seam: np.ndarray  # (e,) bool
+    corner_triangles: np.ndarray  # (t, 3) corners
+    uv: np.ndarray | None  # (c, 2) float64
+    pinned: np.ndarray  # (c,) bool
+
+
+def read(obj):
+    """The object's mesh as arrays, in any mode; does not change it."""
+    layer = obj.data.uv_layers.active
+    name = layer.name if layer else None
+    if obj.mode != 'EDIT':
+        return _read(obj, obj.data, name)
+    copy = bpy.data.meshes.new(obj.data.name)
+    try:
+        bmesh.from_edit_mesh(obj.data).to_mesh(copy)
+        return _read(obj, copy, name)
+    finally:
+        bpy.data.meshes.remove(copy)
+
+
+def _read(obj, mesh, uv_name):
+    mesh.calc_loop_triangles()
+    vertices = _get(mesh.vertices, "co", np.float32, 3).astype(np.float64)
+    uv, pinned = None, np.zeros(len(mesh.loops), dtype=bool)
+    if uv_name is not None:
+        uv = _get(mesh.uv_layers[uv_name].uv, "vector", np.float32, 2).astype(np.float64)
+        pins = mesh.attributes.get(f".pn.{uv_name}")  # in Blender 4, asking the layer for its pins would make this
+        if pins is not None:
+            pinned = _get(pins.data, "value", bool)
+    return MeshArrays(
+        vertices=vertices @ np.array(obj.matrix_world.to_3x3()).T,
+        corner_vertex=_get(mesh.loops, "vertex_index", np.int32),
+        corner_edge=_get(mesh.loops, "edge_index", np.int32),
+        face_start=_get(mesh.polygons, "loop_start", np.int32),
+        seam=_get(mesh.edges, "use_seam", bool),
+        corner_triangles=_get(mesh.loop_triangles, "loops", np.int32, 3),
+        uv=uv,
+        pinned=pinned,
+    )
+
+
+def _get(collection, name, dtype, width=1):
+    values = np.empty(len(collection) * width, dtype=dtype)
+    collection.foreach_get(name, values)
+    return values.reshape(-1, width) if width > 1 else values
+
+
+def write(obj, corners, uv):
+    """Give the corners their UVs, in a new map "UVMap" if there is none.  Call it `in_object_mode`."""
+    mesh = obj.data
+    layer = mesh.uv_layers.active or mesh.uv_layers.new(name="UVMap")
+    if layer is None:
+        raise UnwrapError("Blender could not add a UV map: remove one of the mesh's UV maps or attributes")
+    values = _get(layer.uv, "vector", np.float32, 2)
+    values[corners] = uv
+    layer.uv.foreach_set("vector", values.ravel())
+    mesh.update()
+
+
+@contextmanager
+def in_object_mode(context):
+    """Leave Edit Mode for a moment: the same objects return to it, with the same selection of objects."""
+    if context.mode != 'EDIT_MESH':
+        yield
+        return
+    view_layer = context.view_layer
+    editing, selected = list(context.objects_in_mode), list(view_layer.objects.selected)
+    bpy.ops.object.mode_set(mode='OBJECT')
+    try:
+        yield
+    finally:
+        _select(view_layer, editing)
+        bpy.ops.object.mode_set(mode='EDIT')
+        _select(view_layer, selected)
+
+
+def _select(view_layer, objects):
+    for obj in view_layer.objects:
+        obj.select_set(obj in objects, view_layer=view_layer)

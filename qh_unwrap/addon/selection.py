@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which objects and faces are meant, in every editor and Blender version."""
+
+from typing import NamedTuple
+
+import bmesh
+import bpy
+import numpy as np
+
+
+class Target(NamedTuple):
+    obj: bpy.types.Object
+    faces: np.ndarray  # (f,) bool, the faces to unwrap
+
+
+def mesh_objects(context):
+    """The meshes being edited, or in Object Mode the selected ones; one object for each mesh, none that is linked."""
+    if context.mode == 'EDIT_MESH':
+        return list(context.objects_in_mode_unique_data)
+    if context.mode == 'OBJECT':
+        return distinct_meshes(context.selected_objects)
+    return []
+
+
+def distinct_meshes(objects):
+    """The first object of each mesh that can be changed."""
+    found = {}
+    for obj in objects:
+        if obj.type == 'MESH' and obj.data.is_editable:
+            found.setdefault(obj.data, obj)
+    return list(found.values())
+
+
+def targets(context):
+    """The faces that the person selected, of each object that has any."""
+    found = [Target(obj, _selected(obj, context)) for obj in mesh_objects(context)]
+    return [target for target in found if target.faces.any()]
+
+
+def visible_faces(mesh):
+    hidden = np.zeros(len(mesh.polygons), dtype=bool)
+    mesh.polygons.foreach_get("hide", hidden)
+    return ~hidden
+
+
+def _selected(obj, context):
+    if obj.mode != 'EDIT':
+        return visible_faces(obj.data)
+    bm = bmesh.from_edit_mesh(obj.data)
+    rule = _rule(bm, context)
+    return np.fromiter((rule(face) and not face.hide for face in bm.faces), dtype=bool, count=len(bm.faces))
+
+
+def _rule(bm, context):
+    uv_layer = bm.loops.layers.uv.active
+    if uv_layer is None or not isinstance(context.space_data, bpy.types.SpaceImageEditor):
+        return _in_mesh
+    sync = context.scene.tool_settings.use_uv_select_sync
+    if bpy.app.version < (5, 0, 0):
+        return _in_mesh if sync else lambda face: face.select and all(loop[uv_layer].select for loop in face.loops)
+    if not sync:
+        return _in_mesh_and_uvs
+    return _in_uvs if bm.uv_select_sync_valid else _in_mesh
+
+
+def _in_mesh(face):
+    return face.select
+
+
+def _in_uvs(face):
+    return face.uv_select
+
+
+def _in_mesh_and_uvs(face):
+    return face.select and face.uv_select

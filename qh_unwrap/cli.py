@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: `qh-unwrap`, `python -m qh_unwrap` and `blender --command qh_unwrap`.
+
+Exit codes: 0 everything unwrapped, 1 something failed (what could be done is written), 2 wrong usage.
+"""
+
+import argparse
+import dataclasses
+import json
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+from . import __version__
+from .addon.options import Placement
+from .core import Settings, UnwrapError
+
+_DESCRIPTION = "Unwrap meshes with little distortion and without flipped faces."
+_INPUT = (
+    "a .blend, .obj, .ply, .stl, .glb, .gltf, .fbx, .usd, .usda or .usdc file,"
+    " or the word 'suzanne' for Blender's monkey with seams"
+)
+
+
+class _UsageError(Exception):
+    pass
+
+
+class _FileError(Exception):
+    pass
+
+
+def main(argv=None):
+    try:
+        return _run(_parser().parse_args(argv))
+    except SystemExit as stop:  # argparse, after --help or a wrong argument
+        return stop.code
+    except _UsageError as error:
+        return _complain(error, 2)
+    except _FileError as error:
+        return _complain(error, 1)
+
+
+def _complain(error, code):
+    print(f"qh-unwrap: error: {error}", file=sys.stderr)
+    return code
+
+
+def _parser():
+    parser = argparse.ArgumentParser(prog="qh-unwrap", description=_DESCRIPTION)
+    parser.add_argument("input", metavar="INPUT", help=_INPUT)
+    parser.add_argument("-o", "--output", type=Path, help="file to write, in any of these formats except .stl")
+    parser.add_argument("--object", action="append", metavar="NAME", help="unwrap this object only; may be repeated")
+    parser.add_argument("--weld", action="store_true", help="first join vertices that lie at the same place")
+    parser.add_argument("--seams-from-islands", action="store_true", help="first mark the cuts of the old UVs as seams")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to this file")
+    parser.add_argument("--preview", type=Path, metavar="FILE.png", help="draw the model and its UVs, checkered")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
+    for kind in (Settings, Placement):
+        group = parser.add_argument_group(kind.__name__.lower())
+        for field in dataclasses.fields(kind):
+            group.add_argument(f"--{field.name.replace('_', '-')}", **_argument(field))
+    return parser
+
+
+def _argument(field):
+    meta = field.metadata
+    description = meta["description"].replace("%", "%%")
+    if field.type is bool:
+        return dict(action=argparse.BooleanOptionalAction, default=field.default, help=description)
+    if meta["choices"]:
+        names = [choice.identifier for choice in meta["choices"]]
+        texts = "; ".join(f"{choice.identifier}: {choice.description}" for choice in meta["choices"])
+        help = f"{description} (default {field.default}). {texts}"
+        return dict(type=str.upper, choices=names, metavar="NAME", default=field.default, help=help)
+    low, high = meta["range"]
+    help = f"{description} ({low:g} to {high:g}, default {field.default:g})"
+    return dict(type=field.type, metavar="NUMBER", default=field.default, help=help)
+
+
+def _run(args):
+    try:
+        settings, placement = (_made_from(args, kind) for kind in (Settings, Placement))
+    except UnwrapError as error:
+        raise _UsageError(error) from None
+    try:
+        import bpy
+    except ImportError:
+        raise _UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
+    from .addon import files, preview, selection, unwrapping
+
+    _check_files(args, files)
+    with _at_file("read", args.input, files):
+        loaded = files.load(args.input)
+    objects = _chosen(loaded, args)
+    files.prepare(objects, weld=args.weld, seams_from_islands=args.seams_from_islands)
+    targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
+    with files.quiet():
+        outcomes = _drain(unwrapping.unwrap_targets(targets, settings, placement, bpy.context))
+    _print_table(outcomes, unwrapping.change)
+
+    done = [outcome for outcome in outcomes if not outcome.error]
+    if args.output and done:
+        with _at_file("write", args.output, files):
+            files.save(args.output)
+    if args.preview and done:
+        with _at_file("write", args.preview, files):
+            preview.render(objects, outcomes, args.preview)
+    if args.json:
+        with _at_file("write", args.json, files):
+            document = _document(args, settings, placement, outcomes, bpy.app.version_string)
+            files.write_text(args.json, json.dumps(document, indent=2) + "\n")
+    return 0 if done and len(done) == len(outcomes) else 1
+
+
+@contextmanager
+def _at_file(verb, path, files):
+    try:
+        with files.quiet():
+            yield
+    except (RuntimeError, OSError) as error:
+        raise _FileError(f"cannot {verb} {path}: {error}") from error
+
+
+def _made_from(args, kind):
+    return kind(**{field.name: getattr(args, field.name) for field in dataclasses.fields(kind)})
+
+
+def _check_files(args, files):
+    if args.input != "suzanne":
+        args.input = Path(args.input)
+        if not args.input.is_file():
+            raise _UsageError(f"there is no file {args.input}")
+        if args.input.suffix.lower() not in files.READERS:
+            raise _UsageError(f"cannot read {args.input}: use {', '.join(files.READERS)}")
+    if args.output and args.output.suffix.lower() not in files.WRITERS:
+        raise _UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(files.WRITERS)}")
+    for path in filter(None, (args.output, _sibling(args.output), args.json, args.preview)):
+        if not path.absolute().parent.is_dir():
+            raise _UsageError(f"there is no folder {path.absolute().parent}")
+        if path.exists() and not args.overwrite:
+            raise _UsageError(f"{path} exists: choose another name, or pass --overwrite")
+
+
+def _sibling(path):
+    """The other file that the format writes, if any."""
+    suffix = {".obj": ".mtl", ".gltf": ".bin"}.get(path.suffix.lower()) if path else None
+    return path.with_suffix(suffix) if suffix else None
+
+
+def _chosen(objects, args):
+    if not objects:
+        raise _FileError(f"there is no mesh in {args.input}")
+    present = [obj.name for obj in objects]
+    unknown = set(args.object or ()) - set(present)
+    if unknown:
+        raise _UsageError(f"there is no mesh object {', '.join(sorted(unknown))}: the file has {', '.join(present)}")
+    return [obj for obj in objects if not args.object or obj.name in args.object]
+
+
+def _drain(steps):
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return stop.value
+
+
+def _print_table(outcomes, change):
+    head = ("island", "faces", "stretch", "sym. Dirichlet", "angle", "area", "flips", "iterations")
+    rows = [_row(outcome, change) for outcome in outcomes if not outcome.error]
+    widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
+    for row in (head, *rows) if rows else ():
+        first, *others = (text.rjust(width) for text, width in zip(row, widths, strict=True))
+        print("  ".join((first.strip().ljust(widths[0]), *others)))
+    for outcome in outcomes:
+        for warning in outcome.warnings:
+            print(f"{outcome.label}: {warning}")
+        if outcome.error:
+            print(f"{outcome.label}: {outcome.error}", file=sys.stderr)
+
+
+def _row(outcome, change):
+    return (
+        f"{outcome.obj} {outcome.number}",
+        str(outcome.faces),
+        *(
+            change(outcome.before, outcome.after, name)
+            for name in ("l2_stretch", "symmetric_dirichlet", "angle", "area")
+        ),
+        str(outcome.after.flips),
+        str(outcome.iterations),
+    )
+
+
+def _document(args, settings, placement, outcomes, blender_version):
+    return dict(
+        versions=dict(qh_unwrap=__version__, blender=blender_version),
+        input=str(args.input),
+        output=str(args.output) if args.output else None,
+        settings=dataclasses.asdict(settings) | dataclasses.asdict(placement),
+        islands=[outcome.to_dict() for outcome in outcomes],
+    )

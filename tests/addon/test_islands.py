@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import numpy as np
+import pytest
+
+from qh_unwrap.core.islands import cuts, find_islands
+
+
+def mesh(faces, seams=()):
+    """The arrays that `find_islands` takes, of faces given as lists of vertices; triangulated as fans."""
+    corner_vertex = np.concatenate([np.array(face) for face in faces])
+    start = np.cumsum([0] + [len(face) for face in faces])[:-1]
+    edges, corner_edge, triangles = {}, [], []
+    for face, first in zip(faces, start, strict=True):
+        for one, other in zip(face, face[1:] + face[:1], strict=True):
+            corner_edge.append(edges.setdefault(frozenset((one, other)), len(edges)))
+        triangles += [(first, first + k, first + k + 1) for k in range(1, len(face) - 1)]
+    seam = np.zeros(len(edges), dtype=bool)
+    for pair in seams:
+        seam[edges[frozenset(pair)]] = True
+    return corner_vertex, np.array(corner_edge), start, seam, np.array(triangles)
+
+
+def split(faces, seams=(), selected=None):
+    corner_vertex, corner_edge, start, seam, triangles = mesh(faces, seams)
+    chosen = np.ones(len(faces), dtype=bool) if selected is None else np.isin(np.arange(len(faces)), selected)
+    return find_islands(corner_vertex, corner_edge, start, seam, chosen, triangles)
+
+
+def grid(size):
+    """Quads of a size x size grid; vertex i, j has number i * (size + 1) + j."""
+    row = size + 1
+    return [
+        [i * row + j, (i + 1) * row + j, (i + 1) * row + j + 1, i * row + j + 1]
+        for i in range(size)
+        for j in range(size)
+    ]
+
+
+def test_one_island_keeps_every_vertex_once():
+    (island,) = split(grid(3))
+    assert sorted(island.vertices) == list(range(16))
+    assert len(island.triangles) == 18
+    assert np.array_equal(island.vertices[island.corner_vertex], mesh(grid(3))[0])
+
+
+def test_triangles_follow_the_faces_winding():
+    (island,) = split([[0, 1, 2, 3, 4]])
+    assert np.array_equal(island.vertices[island.triangles], [(0, 1, 2), (0, 2, 3), (0, 3, 4)])
+
+
+def test_seam_across_makes_two_islands():
+    across = [(4, 5), (5, 6), (6, 7)]
+    one, other = split(grid(3), across)
+    assert list(one.faces) == [0, 1, 2]
+    assert list(other.faces) == [3, 4, 5, 6, 7, 8]
+    assert len(one.vertices) == 8 and len(other.vertices) == 12
+
+
+def test_seam_inside_opens_the_island():
+    row = 5
+    inside = [(row * 1 + 2, row * 2 + 2), (row * 2 + 2, row * 3 + 2)]
+    (island,) = split(grid(4), inside)
+    vertices, counts = np.unique(island.vertices, return_counts=True)
+    assert list(vertices[counts == 2]) == [row * 2 + 2], "the middle of the slit, and not its ends"
+
+
+def test_seam_from_the_outline_opens_its_start():
+    (island,) = split(grid(2), [(1, 4)])
+    vertices, counts = np.unique(island.vertices, return_counts=True)
+    assert list(vertices[counts == 2]) == [1]
+
+
+def test_bow_tie_is_two_islands():
+    one, other = split([[0, 1, 2], [0, 3, 4]])
+    assert sorted(one.vertices) == [0, 1, 2] and sorted(other.vertices) == [0, 3, 4]
+
+
+def test_pinched_island_splits_the_vertex():
+    """A ring of faces that meets itself in one vertex only."""
+    (island,) = split([[0, 1, 2], [1, 3, 2], [3, 4, 2], [3, 5, 4], [5, 0, 4]])
+    assert list(island.vertices).count(0) == 2
+
+
+def test_edge_of_three_faces_bounds_islands():
+    islands = split([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    assert [list(island.faces) for island in islands] == [[0], [1], [2]]
+
+
+def test_third_face_not_selected_does_not_matter():
+    (island,) = split([[0, 1, 2], [1, 0, 3], [0, 1, 4]], selected=[0, 1])
+    assert list(island.faces) == [0, 1]
+
+
+def test_opposite_winding_bounds_islands():
+    assert len(split([[0, 1, 2], [0, 1, 3]])) == 2
+    assert len(split([[0, 1, 2], [1, 0, 3]])) == 1
+
+
+def test_duplicate_faces_are_islands_of_their_own():
+    assert len(split([[0, 1, 2], [0, 1, 2]])) == 2
+
+
+def test_only_selected_faces():
+    islands = split(grid(3), selected=[0, 2, 8])
+    assert [list(island.faces) for island in islands] == [[0], [2], [8]]
+    assert split(grid(3), selected=[]) == []
+
+
+@pytest.mark.parametrize(
+    "faces",
+    [
+        [[0, 1, 2, 3], [2, 1, 0, 4]],  # both cut from 0 to 2
+        [[0, 1, 2, 3, 4, 5], [3, 2, 1, 0, 6, 7]],  # three edges in a row
+        [[0, 1, 2, 3], [2, 1, 0, 4], [0, 3, 5], [3, 2, 5], [2, 4, 6], [4, 0, 6]],
+    ],
+)
+def test_faces_that_share_several_edges(faces):
+    """The triangles beside the shared edges must not lie on top of each other."""
+    (island,) = split(faces)
+    triangles = np.sort(island.triangles, axis=1)
+    assert len(np.unique(triangles, axis=0)) == len(triangles) == sum(len(face) - 2 for face in faces)
+    edges = np.sort(np.vstack([island.triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]), axis=1)
+    assert np.unique(edges, axis=0, return_counts=True)[1].max() == 2
+    directed = np.vstack([island.triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    assert len(np.unique(directed, axis=0)) == len(directed), "all are wound alike"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_selected_corner_is_in_one_island(seed):
+    random = np.random.default_rng(seed)
+    faces = grid(6)
+    edges = [(face[k], face[k - 1]) for face in faces for k in range(4)]
+    seams = [edges[k] for k in random.choice(len(edges), 25)]
+    selected = np.flatnonzero(random.random(len(faces)) < 0.7)
+    islands = split(faces, seams, selected)
+    corners = np.concatenate([island.corners for island in islands])
+    assert np.array_equal(np.sort(corners), np.flatnonzero(np.isin(np.repeat(range(36), 4), selected)))
+    for island in islands:
+        assert np.array_equal(np.unique(island.triangles), np.arange(len(island.vertices)))
+        assert len(island.triangles) == 2 * len(island.faces)
+
+
+def test_cuts_are_where_uvs_part():
+    corner_vertex, corner_edge, start, seam, _ = mesh(grid(2))
+    points = np.array([(i, j) for i in range(3) for j in range(3)], dtype=float)
+    uv = points[corner_vertex]
+    assert not cuts(corner_vertex, corner_edge, start, len(seam), uv).any()
+    uv[4:8] += 5
+    cut = cuts(corner_vertex, corner_edge, start, len(seam), uv)
+    inner = {edge for edge in corner_edge[4:8] if np.sum(corner_edge == edge) == 2}
+    assert set(np.flatnonzero(cut)) == inner and len(inner) == 2
