@@ -22,8 +22,8 @@ def held_vertices(surface, settings, uv=None, pinned=None):
     """
     warnings = ()
     loop = surface.loops[0]
-    if settings.boundary != "RECTANGLE" and settings.boundary != "KEEP" and pinned is not None and pinned.any():
-        raise PinError("pins need the boundary KEEP (this one moves the whole outline): unpin, or keep the boundary")
+    if settings.boundary in ("CIRCLE", "OUTLINE") and pinned is not None and pinned.any():
+        raise PinError("pins need the boundary FREE or KEEP: unpin, or choose one of these")
     if settings.boundary == "KEEP":
         if uv is None:
             raise UVError("a kept boundary needs UVs, and there are none: choose another boundary")

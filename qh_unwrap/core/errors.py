@@ -19,7 +19,7 @@ class PinError(UnwrapError):
 
 
 class BoundaryError(UnwrapError):
-    """The kept boundary crosses itself or encloses nothing."""
+    """The kept boundary crosses itself or encloses nothing, or a free one has no triangulator."""
 
 
 class SurfaceError(UnwrapError):

@@ -21,13 +21,16 @@ def initial_map(surface, initial, dirichlet, uv=None):
     else:
         start = project(surface) if initial == "PROJECTION" else conformal(surface)
     held = dirichlet.held
-    return np.where(held[:, None], dirichlet.values, fit(start, held, dirichlet.values))
+    return np.where(held[:, None], dirichlet.values, fit(start, held, dirichlet.values, mirror=True))
 
 
-def fit(points, chosen, targets):
-    """Move `points` (n, 2) by the similarity, or mirrored one, that brings the `chosen` nearest to their targets."""
+def fit(points, chosen, targets, mirror=False):
+    """Move `points` (n, 2) by the similarity that brings the `chosen` nearest to their targets, or a mirrored one."""
     z, target = (xy[:, 0] + 1j * xy[:, 1] for xy in (points, targets))
-    best = min((_fit(candidate, chosen, target) for candidate in (z, z.conj())), key=lambda found: found[0])[1]
+    best = min(
+        (_fit(candidate, chosen, target) for candidate in ((z, z.conj()) if mirror else (z,))),
+        key=lambda found: found[0],
+    )[1]
     return np.column_stack([best.real, best.imag])
 
 

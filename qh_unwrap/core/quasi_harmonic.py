@@ -7,7 +7,7 @@ import numpy as np
 
 from .errors import SettingsError
 from .tensor import squared_stretches
-from .validity import Repair
+from .validity import Repair, invalid
 from .weights import scheme
 
 _REMEMBER_ABOVE = 0.375  # the balance above which forgotten repairs make the iteration oscillate
@@ -29,30 +29,45 @@ class State:
     """Weights had to be changed, in this iteration or an earlier one, to turn flipped triangles back."""
 
 
-def iterate(surface, dirichlet, settings, uv):
-    """Improve the map `uv` (n, 2); yields a `State` for it and after every iteration, ends when converged.
+class Held:
+    """A domain whose outline is held: nothing but the system that `dirichlet` solves on `surface`."""
+
+    def __init__(self, surface, dirichlet):
+        self.surface = surface
+        self.dirichlet = dirichlet
+
+    def renewed(self, uv):
+        return uv
+
+    def balanced(self, _uv, tensor):
+        return tensor
+
+
+def iterate(domain, settings, uv, n):
+    """Improve the map `uv`, of which the surface's n vertices count; yields a `State` for it and after every iteration,
+    ends when converged.
 
     One iteration takes the tensor M of the map (section 4 of the paper, eq. 7) in every triangle, discretises
-    div(M grad f) = 0 (eq. 10) and solves for both coordinates.
-
-    Raises `SettingsError` where the weights cannot be used with the balance.
+    div(M grad f) = 0 (eq. 10) and solves for both coordinates.  `domain` is `Held` or an `Exterior`, and knows
+    the other vertices.
     """
-    _check_balance(settings)
-    next_weights = scheme(surface, settings)
-    repair = Repair(surface, dirichlet, remember=settings.balance > _REMEMBER_ABOVE)
+    next_weights = scheme(settings)
+    repair = Repair(remember=settings.balance > _REMEMBER_ABOVE)
     repairing = settings.repair and settings.weights == "COTANGENT"
     change = np.inf
-    yield State(0, uv, change, not repair.invalid(uv).any(), False)
+    yield State(0, uv, change, not invalid(domain.surface, uv).any(), False)
     for iteration in range(1, settings.iterations + 1):
         if change <= settings.tolerance:
             return
-        weights = next_weights(uv)
-        previous, uv = uv, repair.solve(weights, uv) if repairing else dirichlet.solve(weights)
-        change = float(np.linalg.norm(uv - previous, axis=1).max() / diameter(uv))
-        yield State(iteration, uv, change, not repair.invalid(uv).any(), repair.active)
+        previous = uv = domain.renewed(uv)
+        weights = next_weights(domain, uv)
+        uv = repair.solve(domain, weights, uv) if repairing else domain.dirichlet.solve(weights)
+        change = float(np.linalg.norm((uv - previous)[:n], axis=1).max() / diameter(uv[:n]))
+        yield State(iteration, uv, change, not invalid(domain.surface, uv).any(), repair.active)
 
 
-def _check_balance(settings):
+def check_settings(settings):
+    """Raise `SettingsError` where the weights cannot be used with the balance or the boundary."""
     if settings.weights == "MEAN_VALUE" and settings.balance > 0.5:
         raise SettingsError(
             "mean value weights diverge for a balance above 0.5: lower it, or use the weights COTANGENT"
@@ -60,6 +75,11 @@ def _check_balance(settings):
     if settings.weights == "MEAN_VALUE_SCALAR" and settings.balance == 1:
         raise SettingsError(
             "area-only weights change nothing at balance 1: lower it, or take the start MEAN_VALUE with 0 iterations"
+        )
+    if settings.boundary == "FREE" and settings.weights != "COTANGENT":
+        raise SettingsError(
+            f"a free boundary needs the weights COTANGENT, not {settings.weights}: change them, or choose the boundary"
+            " CIRCLE"
         )
 
 

@@ -25,7 +25,12 @@ def setting(default, label, description, *, range=None, soft_range=None, choices
 
 
 _INITIAL = (
-    Choice("AUTO", "Automatic", "The existing UVs for a kept boundary if they have no flips, else mean value"),
+    Choice(
+        "AUTO",
+        "Automatic",
+        "The UVs themselves where outline or pins are kept and nothing is flipped; for a free outline the best of"
+        " several maps; else mean value",
+    ),
     Choice("UNIFORM", "Uniform", "Each vertex at the average of its neighbours (Tutte)"),
     Choice("HARMONIC", "Harmonic", "Angle preserving with the boundary held (cotangent weights)"),
     Choice("MEAN_VALUE", "Mean Value", "Free of flips on a convex boundary, whatever the mesh (Floater 2003)"),
@@ -35,6 +40,7 @@ _INITIAL = (
 )
 
 _BOUNDARY = (
+    Choice("FREE", "Free", "The island finds its own outline, without overlaps; pinned vertices stay"),
     Choice("CIRCLE", "Circle", "The outline becomes a circle"),
     Choice(
         "RECTANGLE", "Rectangle", "The outline becomes a rectangle; pin four outline vertices to choose its corners"

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A triangulated surface, checked once when it is made; everything after it trusts it."""
 
+import copy
 from functools import cached_property
 
 import numpy as np
@@ -70,18 +71,15 @@ class Surface:
             )
 
     def _check_edges(self):
-        n = len(self.vertices)
+        count = self._number_edges()
+        edge = self.half_edge_edges
         start, end = self.half_edges
-        key = np.minimum(start, end) * n + np.maximum(start, end)
-        unique, edge, count = np.unique(key, return_inverse=True, return_counts=True)
         if count.max() > 2:
             raise errors.NonManifoldEdgeError(
                 f"{np.sum(count > 2)} edges have more than two faces: split the faces there, or mark seams",
                 np.flatnonzero(count[edge] > 2) % len(self.triangles),
             )
-        self.edges = np.column_stack([unique // n, unique % n])
-        self.triangle_edges = edge.reshape(3, -1).T
-        forward = np.bincount(edge, weights=start < end, minlength=len(unique))
+        forward = np.bincount(edge, weights=start < end, minlength=len(count))
         wrong = (count == 2) & (forward != 1)
         if wrong.any():
             raise errors.WindingError(
@@ -89,6 +87,16 @@ class Surface:
                 np.flatnonzero(wrong[edge]) % len(self.triangles),
             )
         self.on_boundary = count[edge] == 1
+
+    def _number_edges(self):
+        """Make `edges` and `triangle_edges`; returns how many triangles each edge has."""
+        n = len(self.vertices)
+        start, end = self.half_edges
+        key = np.minimum(start, end) * n + np.maximum(start, end)
+        unique, edge, count = np.unique(key, return_inverse=True, return_counts=True)
+        self.edges = np.column_stack([unique // n, unique % n])
+        self.triangle_edges = edge.reshape(3, -1).T
+        return count
 
     def _check_vertices(self):
         # Two corners at one vertex belong to one fan if their triangles share an edge there.
@@ -175,6 +183,19 @@ class Surface:
         closed = Surface(np.vstack([self.vertices, *centres]), np.vstack([self.triangles, *fans]))
         closed.air[len(self.triangles) :] = air
         return closed
+
+    def with_air(self, triangles, count):
+        """The surface with `triangles` (t, 3) of air, which use `count` more vertices after its own."""
+        wider = copy.copy(self)
+        wider.vertices = np.pad(self.vertices, ((0, count), (0, 0)))
+        wider.triangles = np.vstack([self.triangles, triangles])
+        wider._number_edges()
+        some_shape = np.broadcast_to([[0.0, 0], [1, 0], [0, 1]], (len(triangles), 3, 2))
+        wider.flat = np.concatenate([self.flat, some_shape])
+        wider.area, wider.degenerate = (np.pad(each, (0, len(triangles))) for each in (self.area, self.degenerate))
+        wider.air = np.pad(self.air, (0, len(triangles)), constant_values=True)
+        del wider.loops, wider.on_boundary  # those of the surface alone
+        return wider
 
     def shapes_in(self, uv):
         """The corners (m, 3, 2) of the surface's triangles laid flat, and of air where the layout has it."""

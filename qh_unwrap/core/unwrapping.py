@@ -7,9 +7,10 @@ import numpy as np
 
 from .boundary import held_vertices, outer_loop
 from .distortion import Distortion, checked_uv, measure
-from .errors import PinError
-from .initial import initial_map
-from .quasi_harmonic import energy, iterate
+from .errors import BoundaryError, PinError, UVError
+from .exterior import Exterior
+from .initial import conformal, fit, initial_map, project
+from .quasi_harmonic import Held, check_settings, energy, iterate
 from .settings import Settings
 from .solver import Dirichlet
 from .surface import Surface
@@ -58,7 +59,7 @@ class Result:
     report: Report
 
 
-def unwrap(vertices, triangles, settings=None, uv=None, pinned=None):
+def unwrap(vertices, triangles, settings=None, uv=None, pinned=None, triangulate=None):
     """Unwrap a surface.
 
     Parameters
@@ -66,13 +67,15 @@ def unwrap(vertices, triangles, settings=None, uv=None, pinned=None):
     vertices : (n, 3), any unit
     triangles : (m, 3), consistently wound; one piece, manifold, with a boundary and without handles
     settings : Settings
-    uv : (n, 2), the current UVs: needed to keep the boundary or to start from them, else only measured
-    pinned : (n,) bool: vertices that stay where `uv` has them (boundary KEEP), or four corners (RECTANGLE)
+    uv : (n, 2), the current UVs: needed for pins, to keep the boundary or to start from them, else only measured
+    pinned : (n,) bool, vertices that stay where `uv` has them (boundary FREE or KEEP), or four corners (RECTANGLE)
+    triangulate : for the boundary FREE, a function of points (p, 2) and sides (s, 2), pairs of points, that returns
+        the triangles (t, 3) of the points' constrained Delaunay triangulation, or None if it cannot keep the points
 
-    Returns a `Result`: `.uv` (n, 2) within the unit square, or in the frame of `uv` for the boundary KEEP, and
+    Returns a `Result`: `.uv` (n, 2), within the unit square or, where `uv` holds anything, in its frame, and
     `.report`.  Raises a subclass of `UnwrapError`.
     """
-    steps = unwrap_steps(vertices, triangles, settings, uv, pinned)
+    steps = unwrap_steps(vertices, triangles, settings, uv, pinned, triangulate)
     while True:
         try:
             next(steps)
@@ -80,73 +83,132 @@ def unwrap(vertices, triangles, settings=None, uv=None, pinned=None):
             return stop.value
 
 
-def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None):
+def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, triangulate=None):
     """Like `unwrap`, as a generator that yields a `State` after each iteration and returns the `Result`."""
     settings = settings or Settings()
+    check_settings(settings)
     surface = Surface(vertices, triangles)
+    n = len(surface.vertices)
     uv = None if uv is None else checked_uv(surface, uv)
-    pinned = None if pinned is None else _checked_pins(surface, pinned)
+    pinned = _checked_pins(surface, pinned)
 
-    # A mirrored outline is unwrapped as seen in a mirror.
-    mirrored = settings.boundary == "KEEP" and uv is not None and enclosed_area(uv[outer_loop(surface, uv)]) < 0
+    # Where the old UVs hold the new ones and are mirrored, unwrap as seen in a mirror.
+    in_frame = uv is not None and (settings.boundary == "KEEP" or (settings.boundary == "FREE" and pinned.any()))
+    mirrored = in_frame and enclosed_area(uv[outer_loop(surface, uv)]) < 0
     mirror = np.array([-1.0, 1.0]) if mirrored else np.ones(2)
     given = None if uv is None else uv * mirror
 
-    held, values, warnings = held_vertices(surface, settings, given, pinned)
-    solid = surface if settings.boundary == "KEEP" else surface.filled(air=not settings.fill_holes)
-    added = len(solid.vertices) - len(surface.vertices)
-    dirichlet = Dirichlet(solid.vertices, solid.edges, np.pad(held, (0, added)), np.pad(values, ((0, added), (0, 0))))
-    start = initial_map(solid, _chosen_start(settings, surface, given), dirichlet, _extended(surface, given, added))
+    if settings.boundary == "FREE":
+        domain, start, warnings = _free(surface, settings, given, pinned, triangulate)
+    else:
+        domain, start, warnings = _held(surface, settings, given, pinned)
 
-    n = len(surface.vertices)
     changes, best, least = [], None, np.inf
-    for state in iterate(solid, dirichlet, settings, start):
+    for state in iterate(domain, settings, start, n):
+        state = replace(state, uv=state.uv[:n])
         if state.iteration:
             changes.append(state.change)
-        # Repairs make the energy rise and fall: keep the best valid map from then on.
-        if state.valid and (best is None or not state.repaired):
-            best, least = state, energy(solid, state.uv, settings.balance)
-        elif state.valid and (value := energy(solid, state.uv, settings.balance)) < least:
-            best, least = state, value
+        # Repairs and new air make the energy rise and fall: keep the best valid map from then on.
+        uneven = state.repaired or settings.boundary == "FREE"
+        if state.valid:
+            value = energy(surface, state.uv, settings.balance) if uneven else np.inf
+            if best is None or not uneven or value < least:
+                best, least = state, value
         if state.iteration:
-            yield replace(state, uv=state.uv[:n] * mirror)
-    chosen = best if best is not None and state.repaired else state
+            yield replace(state, uv=state.uv * mirror)
+    chosen = best.uv if best is not None and uneven else state.uv
+    if settings.boundary == "FREE" and not in_frame:
+        chosen = (chosen - chosen.min(axis=0)) / np.ptp(chosen, axis=0).max()
 
     if surface.degenerate.any():
         warnings += (f"{surface.degenerate.sum()} faces have zero area",)
     report = Report(
         before=None if given is None else measure(surface, given),
         initial=measure(surface, start[:n]),
-        after=measure(surface, chosen.uv[:n]),
+        after=measure(surface, chosen),
         iterations=len(changes),
         converged=bool(changes) and changes[-1] <= settings.tolerance,
         changes=tuple(changes),
-        injective=is_injective(chosen.uv[:n], surface.triangles, surface.loops),
+        injective=is_injective(chosen, surface.triangles, surface.loops),
         mirrored=bool(mirrored),
         warnings=warnings,
     )
-    return Result(chosen.uv[:n] * mirror, report)
+    return Result(chosen * mirror, report)
 
 
 def _checked_pins(surface, pinned):
+    if pinned is None:
+        return np.zeros(len(surface.vertices), bool)
     pinned = np.asarray(pinned)
     if pinned.shape != (len(surface.vertices),) or pinned.dtype != bool:
         raise PinError(f"the pins must be True or False for each of the {len(surface.vertices)} vertices")
     return pinned
 
 
-def _chosen_start(settings, surface, uv):
-    if settings.initial != "AUTO":
-        return settings.initial
-    if settings.boundary == "KEEP":
-        now = measure(surface, uv)
-        if not now.flips and not now.collapsed:
-            return "CURRENT"
-    return "MEAN_VALUE"
+def _held(surface, settings, uv, pinned):
+    """The domain with its outline held, the initial map of it, and warnings."""
+    held, values, warnings = held_vertices(surface, settings, uv, pinned)
+    solid = surface if settings.boundary == "KEEP" else surface.filled(air=not settings.fill_holes)
+    added = len(solid.vertices) - len(surface.vertices)
+    dirichlet = Dirichlet(solid.vertices, solid.edges, np.pad(held, (0, added)), np.pad(values, ((0, added), (0, 0))))
+    initial = settings.initial
+    if initial == "AUTO":
+        initial = "CURRENT" if settings.boundary == "KEEP" and _is_valid(surface, uv) else "MEAN_VALUE"
+    if uv is not None and added:  # each hole's centre at the mean of its outline
+        uv = np.vstack([uv, *(uv[loop].mean(axis=0) for loop in surface.loops[1:])])
+    return Held(solid, dirichlet), initial_map(solid, initial, dirichlet, uv), warnings
 
 
-def _extended(surface, uv, added):
-    """The UVs of the filled surface: each hole's centre at the mean of its outline."""
-    if uv is None or not added:
+def _free(surface, settings, uv, pinned, triangulate):
+    """The same with the outline free."""
+    if triangulate is None:
+        raise BoundaryError("a free boundary needs a triangulator of the plane around it: pass triangulate")
+    if pinned.any() and uv is None:
+        raise UVError("pins need UVs, and there are none: unpin")
+    exterior = Exterior(surface, triangulate, pinned)
+    warnings = ()
+    if settings.initial == "AUTO":
+        start = uv if pinned.any() and _is_valid(surface, uv) else _best_start(surface, settings)
+    else:
+        start = _natural_start(surface, settings, settings.initial, uv)
+    if pinned.any():
+        start = np.where(pinned[:, None], uv, fit(start, pinned, uv))
+    if not settings.iterations:
+        return exterior, start, warnings
+    with_air = exterior.renewed(start)
+    if with_air is None:
+        circle = _natural_start(surface, settings, "MEAN_VALUE", uv)
+        start = np.where(pinned[:, None], uv, fit(circle, pinned, uv)) if pinned.any() else circle
+        warnings = ("the start overlaps itself: begun with a circle",)
+        with_air = exterior.renewed(start)
+        if with_air is None:
+            raise PinError("the pins make the outline cross itself: unpin some, or move them")
+    return exterior, with_air, warnings
+
+
+def _natural_start(surface, settings, initial, uv):
+    """The initial map as it is, or within a circle where it needs a boundary."""
+    if initial == "CONFORMAL":
+        return conformal(surface)
+    if initial == "PROJECTION":
+        return project(surface)
+    if initial == "CURRENT" and uv is not None:
         return uv
-    return np.vstack([uv, *(uv[loop].mean(axis=0) for loop in surface.loops[1:])])
+    circle = replace(settings, boundary="CIRCLE", initial=initial)
+    return _held(surface, circle, uv, np.zeros(len(surface.vertices), bool))[1][: len(surface.vertices)]
+
+
+def _best_start(surface, settings):
+    """Of the certified natural maps the one of least energy; if there is none, the mean value map in a circle."""
+    best, least = None, np.inf
+    for initial in ("PROJECTION", "CONFORMAL", "MEAN_VALUE"):
+        start = _natural_start(surface, settings, initial, None)
+        value = energy(surface, start, settings.balance)
+        if value < least and is_injective(start, surface.triangles, surface.loops):
+            best, least = start, value
+    return start if best is None else best
+
+
+def _is_valid(surface, uv):
+    now = measure(surface, uv)
+    return not now.flips and not now.collapsed

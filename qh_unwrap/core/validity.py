@@ -93,56 +93,60 @@ def count_crossings(polygons, touching=False):
     return crossings
 
 
+def invalid(surface, uv):
+    """The triangles that are not positive though they could be, air included, (m,) bool."""
+    return (orientation(uv, surface.triangles) <= 0) & ~surface.degenerate
+
+
 class Repair:
-    """Turns flipped triangles back by flooring the weights around them."""
+    """Turns flipped triangles back by flooring the weights around them.
 
-    def __init__(self, surface, dirichlet, remember):
-        self.surface = surface
-        self.dirichlet = dirichlet
+    With `remember`, floored weights stay so in later solves; `active` tells whether any had to be floored.
+    """
+
+    def __init__(self, remember):
         self.remember = remember
-        self.active = False  # whether any repair was ever needed
-        self._marked = np.zeros(len(surface.vertices), bool)
+        self.active = False
+        self._marked = np.zeros(0, bool)
 
-    def invalid(self, uv):
-        """The triangles that are not positive though they could be, (m,) bool."""
-        return (orientation(uv, self.surface.triangles) <= 0) & ~(self.surface.degenerate | self.surface.air)
+    def solve(self, domain, weights, previous):
+        """Solve with symmetric `weights` (2, k); where the island flips, again with raised weights.
 
-    def solve(self, weights, previous):
-        """Solve with symmetric `weights` (2, k); where the result flips, again with raised weights.
-
-        If that does not help, go only part of the way from the `previous` map, where that one is valid.
+        If that does not help, or only air flips, go part of the way from the `previous` map, where that one is valid.
         """
-        if not self.remember:
-            self._marked[:] = False
+        surface, dirichlet = domain.surface, domain.dirichlet
+        marked = np.zeros(len(surface.vertices), bool)
+        if self.remember:
+            kept = self._marked[: len(marked)]  # air, the last, may have changed
+            marked[: len(kept)] = kept
         for _ in range(_ROUNDS + 1):
-            uv = self.dirichlet.solve(self._floored(weights))
-            wrong = self.invalid(uv)
+            uv = dirichlet.solve(_floored(dirichlet, surface.edges, weights, marked))
+            wrong = invalid(surface, uv)
             if not wrong.any():
+                self._marked = marked
                 return uv
             self.active = True
-            self._mark(wrong)
-        if not self.invalid(previous).any():
+            if not wrong[~surface.air].any():
+                break
+            marked[surface.triangles[wrong]] = True
+            for _ in range(2):  # and two rings around them
+                marked[surface.edges[marked[surface.edges].any(axis=1)]] = True
+        self._marked = marked
+        if not invalid(surface, previous).any():
             for halving in range(1, _HALVINGS + 1):
                 shorter = previous + (uv - previous) / 2**halving
-                if not self.invalid(shorter).any():
+                if not invalid(surface, shorter).any():
                     return shorter
             return previous
         return uv
 
-    def _mark(self, wrong):
-        # Every vertex of a wrong triangle, and the two rings around it
-        self._marked[self.surface.triangles[wrong]] = True
-        edges = self.surface.edges
-        for _ in range(2):
-            self._marked[edges[self._marked[edges].any(axis=1)]] = True
 
-    def _floored(self, weights):
-        edges = self.surface.edges
-        near = self._marked[edges].any(axis=1)
-        if not near.any():
-            return weights
-        diagonal = np.abs(self.dirichlet.diagonal(weights))
-        i, j = edges[near].T
-        floored = weights.copy()
-        floored[:, near] = np.maximum(weights[:, near], _FLOOR / 6 * np.sqrt(diagonal[i] * diagonal[j]))
-        return floored
+def _floored(dirichlet, edges, weights, marked):
+    near = marked[edges].any(axis=1)
+    if not near.any():
+        return weights
+    diagonal = np.abs(dirichlet.diagonal(weights))
+    i, j = edges[near].T
+    floored = weights.copy()
+    floored[:, near] = np.maximum(weights[:, near], _FLOOR / 6 * np.sqrt(diagonal[i] * diagonal[j]))
+    return floored

@@ -101,28 +101,37 @@ class Stretch:
     after every solve, for ever.
     """
 
-    def __init__(self, surface):
-        self.surface = surface
-        self.weights = mean_value(surface)
+    def __init__(self):
+        self.weights = None
 
-    def __call__(self, uv):
-        larger, smaller, *_ = squared_stretches(self.surface, uv)
-        area = np.repeat(self.surface.area, 3)
-        corner = self.surface.triangles.ravel()
+    def __call__(self, domain, uv):
+        surface = domain.surface
+        if self.weights is None:
+            self.weights = mean_value(surface)
+        larger, smaller, *_ = squared_stretches(surface, uv)
+        area = np.repeat(surface.area, 3)
+        corner = surface.triangles.ravel()
         squared = np.repeat((1 / larger + 1 / smaller) / 2, 3)
         stretch = np.sqrt(np.bincount(corner, area * squared) / np.bincount(corner, area))
-        i, j = self.surface.edges.T
+        i, j = surface.edges.T
         self.weights = self.weights / np.stack([stretch[j], stretch[i]])
         return self.weights
 
 
-def scheme(surface, settings):
-    """The function that makes the next weights from a map `uv` (n, 2), as the settings choose."""
+def scheme(settings):
+    """The function of a domain and a map `uv` (n, 2) that makes the next weights, as the settings choose."""
     t, q = settings.balance, settings.tensor_power
-    if settings.weights == "COTANGENT":
-        return lambda uv: cotangent(surface, surface_tensor(surface, uv, t, q), surface.shapes_in(uv))
-    if settings.weights == "MEAN_VALUE":
-        return lambda uv: mean_value(surface, plane_tensor(surface, uv, t, q), uv[surface.triangles])
-    if settings.weights == "MEAN_VALUE_SCALAR":
-        return lambda uv: mean_value(surface, scalar_tensor(surface, uv, t, q), uv[surface.triangles])
-    return Stretch(surface)
+
+    def cotangent_weights(domain, uv):
+        surface = domain.surface
+        tensor = domain.balanced(uv, surface_tensor(surface, uv, t, q))
+        return cotangent(surface, tensor, surface.shapes_in(uv))
+
+    def mean_value_weights(domain, uv):
+        surface = domain.surface
+        tensor = plane_tensor if settings.weights == "MEAN_VALUE" else scalar_tensor
+        return mean_value(surface, tensor(surface, uv, t, q), uv[surface.triangles])
+
+    if settings.weights == "STRETCH":
+        return Stretch()
+    return cotangent_weights if settings.weights == "COTANGENT" else mean_value_weights

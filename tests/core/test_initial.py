@@ -63,5 +63,5 @@ def test_fit_undoes_similarities_and_mirrors():
     chosen = np.arange(20) < 6
     for mirror in (1, -1):
         targets = 3 * (points * [mirror, 1]) @ [[0.8, 0.6], [-0.6, 0.8]] + 2
-        np.testing.assert_allclose(fit(points, chosen, targets), targets, atol=1e-12)
+        np.testing.assert_allclose(fit(points, chosen, targets, mirror=True), targets, atol=1e-12)
     np.testing.assert_allclose(fit(np.zeros((20, 2)), chosen, targets)[0], targets[chosen].mean(axis=0))

@@ -12,11 +12,13 @@ from qh_unwrap.core import Settings, UnwrapError, distortion, errors, unwrap, un
 from qh_unwrap.core.initial import fit
 
 from . import shapes
+from .blender import triangulate
 from .test_tensor import seeds
 
 ALL = {
     field.name: [choice.identifier for choice in field.metadata["choices"]] for field in dataclasses.fields(Settings)
 }
+HELD = [name for name in ALL["boundary"] if name != "FREE"]
 PINS = ("no pins", "inner pins", "four corners")
 
 
@@ -41,6 +43,10 @@ def refusal(initial, boundary, weights, pin, has_uv):
         return errors.PinError
     if boundary == "RECTANGLE" and pin == "inner pins":
         return errors.PinError
+    if boundary == "FREE" and weights != "COTANGENT":
+        return errors.SettingsError
+    if not has_uv and boundary == "FREE" and pin != "no pins":
+        return errors.UVError
     if not has_uv and (boundary == "KEEP" or initial == "CURRENT"):
         return errors.UVError
     return None
@@ -58,10 +64,10 @@ def test_every_combination_works_or_is_refused(initial, boundary, weights, pin, 
     error = refusal(initial, boundary, weights, pin, has_uv)
     if error:
         with pytest.raises(error) as caught:
-            unwrap(vertices, triangles, settings, uv, pinned)
+            unwrap(vertices, triangles, settings, uv, pinned, triangulate)
         assert ":" in str(caught.value)  # says what to do
         return
-    result = unwrap(vertices, triangles, settings, uv, pinned)
+    result = unwrap(vertices, triangles, settings, uv, pinned, triangulate)
     assert result.uv.shape == (len(vertices), 2) and np.isfinite(result.uv).all()
     assert 1 <= result.report.iterations <= 8 and result.report.after.symmetric_dirichlet < 3
     assert (result.report.before is not None) == has_uv
@@ -71,11 +77,13 @@ def test_every_combination_works_or_is_refused(initial, boundary, weights, pin, 
         rim = np.arange(len(vertices)) >= 80
         held = rim if pinned is None else rim | pinned
         np.testing.assert_array_equal(result.uv[held], uv[held])
+    elif boundary == "FREE" and pinned is not None:
+        np.testing.assert_array_equal(result.uv[pinned], uv[pinned])
     else:
         assert result.uv.min() >= -0.021 and result.uv.max() <= 1.021  # a bowed side bulges
 
 
-@given(seeds, st.floats(1e-6, 1e6), st.sampled_from(ALL["boundary"]), st.sampled_from(ALL["weights"]))
+@given(seeds, st.floats(1e-6, 1e6), st.sampled_from(HELD), st.sampled_from(ALL["weights"]))
 def test_similarities_do_not_change_the_result(seed, scale, boundary, weights):
     vertices, triangles = shapes.bump(seed)
     uv = ellipse_uv(vertices)
@@ -85,7 +93,7 @@ def test_similarities_do_not_change_the_result(seed, scale, boundary, weights):
     np.testing.assert_allclose(unwrap(moved, triangles, settings, uv).uv, expected, atol=1e-9)
 
 
-@given(seeds, st.sampled_from(ALL["boundary"]), st.sampled_from(ALL["initial"]))
+@given(seeds, st.sampled_from(HELD), st.sampled_from(ALL["initial"]))
 def test_the_numbering_does_not_change_the_result(seed, boundary, initial):
     vertices, triangles = shapes.bump(seed)
     uv = ellipse_uv(vertices)

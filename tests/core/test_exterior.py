@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import numpy as np
+import pytest
+
+from qh_unwrap.core import Settings, Surface, distortion, errors, unwrap
+from qh_unwrap.core.exterior import Exterior, make_air
+from qh_unwrap.core.surface import signed_areas
+from qh_unwrap.core.tensor import surface_tensor
+from qh_unwrap.core.validity import is_injective
+
+from . import shapes
+from .blender import triangulate
+
+FREE = Settings(boundary="FREE")
+
+
+def free(vertices, triangles, uv=None, pinned=None, **settings):
+    return unwrap(vertices, triangles, Settings(boundary="FREE", **settings), uv, pinned, triangulate)
+
+
+def strip(length, segments, bend=0.0):
+    """A developable ribbon of width 1, rolled by `bend` radians in all."""
+    vertices, triangles = shapes.grid(segments, max(2, segments // int(length)), width=length)
+    x, y, _ = vertices.T
+    if bend:
+        radius = length / bend
+        vertices = np.column_stack([radius * np.sin(x / radius), y, radius * np.cos(x / radius)])
+    return vertices, triangles
+
+
+def cut(vertices, triangles, keep):
+    """The triangles whose centres `keep` accepts, and their vertices."""
+    triangles = triangles[keep(*vertices[triangles].mean(axis=1).T)]
+    used, triangles = np.unique(triangles, return_inverse=True)
+    return vertices[used], triangles.reshape(-1, 3)
+
+
+def developable(name):
+    if name == "strip 4:1":
+        return strip(4, 32, bend=2)
+    if name == "strip 40:1":
+        return strip(40, 160, bend=5)
+    if name == "L":
+        vertices, triangles = cut(*shapes.grid(24, 24), lambda x, y, z: (x < 0.3) | (y < 0.3))
+        x, y, _ = vertices.T
+        return np.column_stack([np.sin(2 * x) / 2, y, np.cos(2 * x) / 2]), triangles
+    if name == "spiral":
+        angle, across = np.meshgrid(np.linspace(0, 5 * np.pi, 200), np.linspace(0, 1, 5))
+        radius = 1 + 0.25 * angle / np.pi + 0.35 * across
+        _, triangles = shapes.grid(199, 4)
+        return np.column_stack(
+            [(radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel(), 0 * angle.ravel()]
+        ), (triangles[:, ::-1])
+    if name == "cone":
+        vertices, triangles = cut(*shapes.grid(30, 10, width=1.8 * np.pi), lambda x, y, z: y > 0.1)
+        x, y, _ = vertices.T
+        return np.column_stack([y * np.cos(x), y * np.sin(x), y]), triangles[:, ::-1]
+    vertices, triangles = shapes.grid(40, 8, width=2 * np.pi, height=2)  # a cylinder cut open
+    x, y, _ = vertices.T
+    return np.column_stack([np.sin(x), y, np.cos(x)]), triangles
+
+
+@pytest.mark.parametrize("name", ["strip 4:1", "strip 40:1", "L", "spiral", "cone", "cylinder"])
+def test_developable_surfaces_become_isometric(name):
+    result = free(*developable(name), iterations=15)
+    assert result.report.injective and result.report.after.flips == 0
+    assert result.report.after.l2_stretch < 1.005
+
+
+@pytest.mark.parametrize("name", ["strip 4:1", "L", "cone", "cylinder"])
+def test_they_also_do_from_a_circle(name):
+    result = free(*developable(name), initial="MEAN_VALUE", iterations=40, tolerance=1e-5)
+    assert result.report.injective
+    assert result.report.after.l2_stretch < 1.005
+
+
+def test_air_fills_the_plane_outside_and_in_holes():
+    vertices, triangles = shapes.ring(24, 3)
+    surface = Surface(vertices, triangles)
+    uv = vertices[:, :2]
+    points, on_circle, air = make_air(uv, surface.loops, triangulate)
+    everything = np.vstack([uv, points])
+    areas = signed_areas(everything[air])
+    assert (areas > 0).all() and len(air) < 1500
+    rim = points[on_circle]
+    whole = signed_areas(np.stack([rim, np.roll(rim, -1, axis=0), np.zeros_like(rim)], axis=1)).sum()
+    assert areas.sum() + signed_areas(uv[triangles]).sum() == pytest.approx(whole, rel=1e-9)
+    with_hole = {tuple(sorted(t)) for t in air.tolist()}
+    assert len(with_hole) == len(air)
+
+
+def test_air_needs_an_outline_that_does_not_cross_itself():
+    vertices, triangles = shapes.random_disk(1)
+    surface = Surface(vertices, triangles)
+    uv = vertices[:, :2].copy()
+    a, b = surface.loops[0][[0, 12]]
+    uv[[a, b]] = uv[[b, a]]
+    assert make_air(uv, surface.loops, triangulate) is None
+    assert make_air(0 * uv, surface.loops, triangulate) is None
+
+
+def test_a_flat_patch_is_a_fixed_point_with_air_around_it():
+    vertices, triangles = shapes.random_disk(2)
+    result = free(vertices, triangles, vertices[:, :2], initial="CURRENT", iterations=3, tolerance=0)
+    assert max(result.report.changes) < 1e-9
+    assert result.report.after.symmetric_dirichlet == pytest.approx(1, abs=1e-9)
+
+
+def test_the_island_neither_grows_nor_spins():
+    vertices, triangles = shapes.bump(3, inner=300, outer=60, height=1.5)
+    result = free(vertices, triangles, iterations=60, tolerance=1e-7)
+    assert result.report.changes[-1] < 1e-3 * result.report.changes[0]
+
+
+def test_a_free_outline_distorts_less_than_a_circle():
+    vertices, triangles = shapes.grid(12, 6, width=3)
+    vertices[:, 2] = 0.3 * np.sin(3 * vertices[:, 0]) * vertices[:, 1]
+    circle = unwrap(vertices, triangles, Settings(boundary="CIRCLE", iterations=20)).report.after
+    ours = free(vertices, triangles, iterations=20).report.after
+    assert ours.symmetric_dirichlet - 1 < 0.2 * (circle.symmetric_dirichlet - 1)
+
+
+def test_every_hole_stays_open():
+    vertices, triangles = shapes.grid(33, 33)
+    plate = cut(vertices, triangles, lambda x, y, z: (np.floor(x * 11) % 2 == 0) | (np.floor(y * 11) % 2 == 0))
+    plate[0][:, 2] = 0.3 * plate[0][:, 0] ** 2
+    surface = Surface(*plate)
+    assert len(surface.loops) == 26
+    result = free(*plate, iterations=12)
+    assert result.report.injective and result.report.after.symmetric_dirichlet < 1.02
+    for loop in surface.loops[1:]:
+        x, y = result.uv[loop].T
+        assert abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 1e-4
+
+
+def test_pins_stay_and_the_rest_follows():
+    vertices, triangles = shapes.bump(4)
+    uv = 2 * vertices[:, :2] @ [[0.8, 0.6], [-0.6, 0.8]] + 3
+    pinned = np.zeros(len(uv), bool)
+    pinned[[5, 40, 90]] = True
+    for mirror in ([1, 1], [-1, 1]):
+        result = free(vertices, triangles, uv * mirror, pinned, iterations=20)
+        np.testing.assert_array_equal(result.uv[pinned], (uv * mirror)[pinned])
+        assert result.report.mirrored == (mirror[0] < 0)
+        assert result.report.injective and result.report.after.symmetric_dirichlet < 1.4
+
+
+def test_crossing_pins_are_never_certified():
+    vertices, triangles = shapes.bump(4)
+    uv = vertices[:, :2].copy()
+    pinned = np.zeros(len(uv), bool)
+    pinned[:40] = True
+    uv[:40] = uv[:40][::-1]
+    result = free(vertices, triangles, uv, pinned)
+    np.testing.assert_array_equal(result.uv[pinned], uv[pinned])
+    assert not result.report.injective and result.report.after.flips > 0
+
+
+def test_starts_that_overlap_give_way_to_a_circle():
+    angle, across = np.meshgrid(np.linspace(0, 3 * np.pi, 60), np.linspace(0, 1, 5))
+    _, triangles = shapes.grid(59, 4)
+    radius = 1 + across
+    stairs = np.column_stack([(radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel(), 0.3 * angle.ravel()])
+    result = free(stairs, triangles[:, ::-1], initial="PROJECTION", iterations=30)
+    assert any("overlaps" in warning for warning in result.report.warnings)
+    assert result.report.injective
+
+
+def test_refusals_name_the_cure():
+    vertices, triangles = shapes.bump(1)
+    with pytest.raises(errors.BoundaryError, match="triangulate"):
+        unwrap(vertices, triangles, FREE)
+    for weights in ("MEAN_VALUE", "MEAN_VALUE_SCALAR", "STRETCH"):
+        with pytest.raises(errors.SettingsError, match="COTANGENT"):
+            free(vertices, triangles, weights=weights)
+    pinned = np.zeros(len(vertices), bool)
+    pinned[3] = True
+    with pytest.raises(errors.UVError):
+        free(vertices, triangles, None, pinned)
+
+
+def test_results_without_pins_lie_in_the_unit_square():
+    vertices, triangles = shapes.bump(6)
+    result = free(vertices, triangles)
+    assert result.uv.min() == 0 and result.uv.max() == pytest.approx(1)
+    surface = Surface(vertices, triangles)
+    assert is_injective(result.uv, triangles, surface.loops)
+    assert distortion(vertices, triangles, result.uv).flips == 0
+
+
+def test_the_tensor_of_an_isometry_needs_no_balance():
+    vertices, triangles = shapes.random_disk(7)
+    surface = Surface(vertices, triangles)
+    exterior = Exterior(surface, triangulate)
+    uv = exterior.renewed(3 * vertices[:, :2])
+    tensor = surface_tensor(exterior.surface, uv, 0.25)
+    np.testing.assert_allclose(exterior.balanced(uv, tensor), tensor, rtol=1e-9)
