@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the benchmarks share: meshes, maps, tables and verdicts.
+
+Run a benchmark from the repository's root, with the package installed or `PYTHONPATH=.`:
+
+    QH_MESHES=folder/of/meshes python -m tests.benchmarks.reference_table --out out
+"""
+
+import argparse
+import os
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from qh_unwrap.core import Settings, unwrap, unwrap_steps
+
+MESHES = "QH_MESHES"
+EXACT = {"boundary": "CIRCLE", "tolerance": 0, "repair": False}  # unless a benchmark says otherwise
+
+
+def load_mesh(path):
+    """Vertices (n, 3) and triangles (m, 3) of an .off or .obj file; larger faces become fans of triangles."""
+    path = Path(path)
+    lines = [line.split("#")[0].split() for line in path.read_text().splitlines()]
+    lines = [line for line in lines if line]
+    if path.suffix == ".off":
+        if lines[0] != ["OFF"]:
+            raise ValueError(f"{path.name} does not begin with OFF")
+        vertex_count, face_count = int(lines[1][0]), int(lines[1][1])
+        points, rest = lines[2 : 2 + vertex_count], lines[2 + vertex_count :]
+        faces = [[int(i) for i in line[1 : 1 + int(line[0])]] for line in rest[:face_count]]
+    elif path.suffix == ".obj":
+        points = [line[1:4] for line in lines if line[0] == "v"]
+        faces = [[int(corner.split("/")[0]) for corner in line[1:]] for line in lines if line[0] == "f"]
+        faces = [[i - 1 if i > 0 else i + len(points) for i in face] for face in faces]
+    else:
+        raise ValueError(f"{path.name} is neither .off nor .obj")
+    triangles = [(face[0], face[k], face[k + 1]) for face in faces for k in range(1, len(face) - 1)]
+    return np.array([point[:3] for point in points], dtype=float), np.array(triangles, dtype=np.int64)
+
+
+def find_mesh(name):
+    """The path of the mesh file `name` within the folder QH_MESHES, or None."""
+    folder = os.environ.get(MESHES)
+    return next(Path(folder).rglob(name), None) if folder else None
+
+
+def given_meshes(*names):
+    """The meshes of these names, as a dictionary; says so and ends the program with 0 where one is missing."""
+    paths = {name: find_mesh(name) for name in names}
+    missing = [name for name, path in paths.items() if path is None]
+    if missing:
+        print(f"skipped: set {MESHES} to a folder that holds {', '.join(missing)}")
+        sys.exit(0)
+    return {Path(name).stem: load_mesh(path) for name, path in paths.items()}
+
+
+def rings(count):
+    """Points (n, 2) on `count` concentric rings of the unit disk, 6 k on ring k, and the triangles between them."""
+    points = [np.zeros((1, 2))]
+    triangles = []
+    for k in range(1, count + 1):
+        angle = 2 * np.pi * np.arange(6 * k) / (6 * k)
+        points.append(k / count * np.column_stack([np.cos(angle), np.sin(angle)]))
+        inner, outer = 1 + 3 * (k - 1) * (k - 2) if k > 1 else 0, 1 + 3 * k * (k - 1)
+        for sector in range(6):
+            for step in range(k):
+                here = outer + sector * k + step
+                after = outer + (sector * k + step + 1) % (6 * k)
+                below = inner + (sector * (k - 1) + step) % max(1, 6 * (k - 1))
+                triangles.append((here, after, below))
+                if step < k - 1:
+                    triangles.append((below, after, inner + (sector * (k - 1) + step + 1) % (6 * (k - 1))))
+    return np.concatenate(points), np.array(triangles)
+
+
+def half_sphere(count=20):
+    """A regular half-sphere of `count` rings: vertices and triangles."""
+    points, triangles = rings(count)
+    radius = np.linalg.norm(points, axis=1)
+    polar = radius * np.pi / 2
+    direction = points / np.where(radius > 0, radius, 1)[:, None]
+    return np.column_stack([np.sin(polar)[:, None] * direction, np.cos(polar)]), triangles
+
+
+def final_map(mesh, uv=None, **settings):
+    """The map (n, 2) to the circle after exactly `iterations`; flips are not repaired unless `repair` is set."""
+    return unwrap(*mesh, Settings(**{**EXACT, **settings}), uv).uv
+
+
+def maps(mesh, uv=None, **settings):
+    """The start (n, 2) and the map after each of exactly `iterations`, as a list; otherwise like `final_map`."""
+    settings = {**EXACT, **settings}
+    start = unwrap(*mesh, Settings(**{**settings, "iterations": 0}), uv).uv
+    return [start, *(state.uv for state in unwrap_steps(*mesh, Settings(**settings), uv))]
+
+
+def distance(uv, other):
+    """The largest distance of a vertex between two maps to the circle, which is 1 wide."""
+    return float(np.linalg.norm(uv - other, axis=1).max())
+
+
+def changes(series):
+    """The largest movement of a vertex in every step of a series of maps to the circle."""
+    return [distance(after, before) for before, after in pairwise(series)]
+
+
+def table(header, rows):
+    """Print rows of texts and numbers below a header, in columns."""
+    cells = [[str(name) for name in header], *([_text(value) for value in row] for row in rows)]
+    widths = [max(len(row[column]) for row in cells) for column in range(len(header))]
+    for place, row in enumerate(cells):
+        others = (cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))
+        print("  ".join([row[0].ljust(widths[0]), *others]).rstrip())
+        if place == 0:
+            print("-" * (sum(widths) + 2 * len(widths) - 2))
+    print()
+
+
+def _text(value):
+    if isinstance(value, float | np.floating):
+        return f"{value:.3e}" if value and not 1e-3 <= abs(value) < 1e4 else f"{value:.4f}"
+    return str(value)
+
+
+class Verdicts:
+    """Claims and whether the figures bear them out; printed as they come, counted at the end."""
+
+    def __init__(self):
+        self.failed = 0
+
+    def claim(self, text, holds, figures=""):
+        self.failed += not holds
+        print(f"{'holds      ' if holds else 'FALLS SHORT'}  {text}{f' ({figures})' if figures else ''}")
+
+    def exit(self):
+        """End the program: 0 if every claim held."""
+        sys.exit(min(self.failed, 1))
+
+
+def output_folder(description):
+    """The folder that `--out` names (default `out`), made if it is missing."""
+    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for pictures (default: out)")
+    folder = parser.parse_args().out
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
