@@ -9,11 +9,13 @@ import bpy
 import numpy as np
 
 from ..core import UnwrapError
+from .options import MeshOptions
 
 
 @dataclass(frozen=True)
 class MeshArrays:
-    vertices: np.ndarray  # (n, 3) float64, with the object's scale
+    vertices: np.ndarray  # (n, 3) float64, as the object shows them, but for its location
+    up: np.ndarray  # (3,) the object's up axis in the same space
     corner_vertex: np.ndarray  # (c,)
     corner_edge: np.ndarray  # (c,)
     face_start: np.ndarray  # (f,) first corner of each face
@@ -21,25 +23,29 @@ class MeshArrays:
     corner_triangles: np.ndarray  # (t, 3) corners
     uv: np.ndarray | None  # (c, 2) float64
     pinned: np.ndarray  # (c,) bool
+    aspect: np.ndarray  # (f,) width by height of the image on each face
 
 
-def read(obj):
+def read(obj, options=MeshOptions()):
     """The object's mesh as arrays, in any mode; does not change it."""
     layer = obj.data.uv_layers.active
     name = layer.name if layer else None
     if obj.mode != 'EDIT':
-        return _read(obj, obj.data, name)
+        return _read(obj, obj.data, name, options)
     copy = bpy.data.meshes.new(obj.data.name)
     try:
         bmesh.from_edit_mesh(obj.data).to_mesh(copy)
-        return _read(obj, copy, name)
+        return _read(obj, copy, name, options)
     finally:
         bpy.data.meshes.remove(copy)
 
 
-def _read(obj, mesh, uv_name):
+def _read(obj, mesh, uv_name, options):
     mesh.calc_loop_triangles()
-    vertices = _get(mesh.vertices, "co", np.float32, 3).astype(np.float64)
+    vertices = _get(mesh.vertices, "co", np.float32, 3)
+    if options.use_subsurf_data:
+        vertices = _smoothed(obj, mesh, vertices)
+    shown = np.array(obj.matrix_world.to_3x3()) if options.correct_scale else np.eye(3)
     uv, pinned = None, np.zeros(len(mesh.loops), dtype=bool)
     if uv_name is not None:
         uv = _get(mesh.uv_layers[uv_name].uv, "vector", np.float32, 2).astype(np.float64)
@@ -47,7 +53,8 @@ def _read(obj, mesh, uv_name):
         if pins is not None:
             pinned = _get(pins.data, "value", bool)
     return MeshArrays(
-        vertices=vertices @ np.array(obj.matrix_world.to_3x3()).T,
+        vertices=vertices.astype(np.float64) @ shown.T,
+        up=shown[:, 2] / (np.linalg.norm(shown[:, 2]) or 1.0),
         corner_vertex=_get(mesh.loops, "vertex_index", np.int32),
         corner_edge=_get(mesh.loops, "edge_index", np.int32),
         face_start=_get(mesh.polygons, "loop_start", np.int32),
@@ -55,6 +62,7 @@ def _read(obj, mesh, uv_name):
         corner_triangles=_get(mesh.loop_triangles, "loops", np.int32, 3),
         uv=uv,
         pinned=pinned,
+        aspect=_aspects(obj, mesh) if options.correct_aspect else np.ones(len(mesh.polygons)),
     )
 
 
@@ -62,6 +70,46 @@ def _get(collection, name, dtype, width=1):
     values = np.empty(len(collection) * width, dtype=dtype)
     collection.foreach_get(name, values)
     return values.reshape(-1, width) if width > 1 else values
+
+
+def _smoothed(obj, mesh, vertices):
+    """Where the object's Subdivision Surface modifier, on its own, takes the vertices of its `mesh`."""
+    modifier = next((one for one in obj.modifiers if one.type == 'SUBSURF' and one.show_viewport), None)
+    if modifier is None:
+        return vertices
+    copy = mesh.copy()
+    scene = bpy.data.scenes.new("QH Unwrap")
+    try:
+        twin = bpy.data.objects.new("QH Unwrap", copy)
+        twin.shape_key_clear()
+        scene.collection.objects.link(twin)
+        alone = twin.modifiers.new(modifier.name, 'SUBSURF')
+        for setting in alone.bl_rna.properties:
+            if not setting.is_readonly:
+                setattr(alone, setting.identifier, getattr(modifier, setting.identifier))
+        view_layer = scene.view_layers[0]
+        view_layer.update()
+        smooth = twin.evaluated_get(view_layer.depsgraph).data
+        return _get(smooth.vertices, "co", np.float32, 3)[: len(vertices)]  # the new ones follow the old
+    finally:
+        bpy.data.scenes.remove(scene)
+        bpy.data.meshes.remove(copy)
+
+
+def _aspects(obj, mesh):
+    slots = np.array([_aspect(slot.material) for slot in obj.material_slots] or [1.0])
+    return slots[np.minimum(_get(mesh.polygons, "material_index", np.int32), len(slots) - 1)]
+
+
+def _aspect(material):
+    """Of the image that Blender shows for the material in the viewport."""
+    nodes = material.node_tree.nodes if material and material.use_nodes and material.node_tree else ()
+    images = [node for node in nodes if node.type == 'TEX_IMAGE' and node.image and min(node.image.size) > 0]
+    if not images:
+        return 1.0
+    image = next((node for node in images if node.show_texture), images[0]).image
+    (width, height), (pixel_width, pixel_height) = image.size, image.display_aspect
+    return (width * pixel_width) / (height * pixel_height)
 
 
 def write(obj, corners, uv):

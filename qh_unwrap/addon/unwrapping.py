@@ -11,6 +11,7 @@ from ..core import Distortion, UnwrapError, distortion, unwrap_steps
 from ..core.errors import UVError
 from ..core.islands import Island, find_islands
 from . import mesh_arrays, placing
+from .delaunay import triangulate
 from .selection import Target
 
 
@@ -135,7 +136,7 @@ def _unwrap(work, settings):
         if settings.boundary == "KEEP" or settings.initial == "CURRENT":
             raise UVError("its UVs are cut where there is no seam; mark the cuts with UV > Seams from Islands")
         uv = None
-    steps = unwrap_steps(work.vertices, work.island.triangles, settings, uv=uv, pinned=work.pinned)
+    steps = unwrap_steps(work.vertices, work.island.triangles, settings, uv=uv, pinned=work.pinned, triangulate=triangulate)
     result = yield from _iterations(steps)
     work.uv = result.uv
     work.outcome.before = result.report.before

@@ -114,14 +114,14 @@ def make_air(uv, loops, triangulate):
 def _graded_points(start, end, centre, radius):
     """Points on ever coarser triangular grids, each about as far from its neighbours as from the outline."""
     length = np.linalg.norm(end - start, axis=1)
-    finest = max(length.mean(), radius / _FINEST)
+    reach = _RADIUS * radius
+    coarsest = step = reach / _COARSEST
+    finest = np.clip(length.mean(), radius / _FINEST, coarsest)
     count = np.maximum(1, np.ceil(length / finest)).astype(int)
     side = np.repeat(np.arange(len(start)), count)
     part = (np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count)) / count[side]
     tree = cKDTree(start[side] + part[:, None] * (end - start)[side])
 
-    reach = _RADIUS * radius
-    coarsest = step = reach / _COARSEST
     grids = []
     while step >= finest:
         k = np.arange(-np.ceil(reach / step), np.ceil(reach / step) + 1)

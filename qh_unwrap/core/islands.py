@@ -23,6 +23,7 @@ class Island:
     vertices: np.ndarray  # (n,) mesh vertex of each island vertex
     triangles: np.ndarray  # (t, 3) island vertices
     triangle_corners: np.ndarray  # (t, 3) the same as mesh corners
+    crowded_edges: int = 0  # edges of its outline where more than two faces meet
 
 
 def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_triangles):
@@ -34,22 +35,22 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
     selected                    (f,) bool, the faces to split
     corner_triangles            (t, 3) the faces' triangles, as corners
 
-    Faces are neighbours across an edge that is no seam and that exactly two selected faces use, in opposite
-    directions.
+    Faces are neighbours across an edge that is no seam and that exactly two selected faces use.
     """
     corner_count, face_count = len(corner_vertex), len(face_start)
     corner_face, following = _around_faces(face_start, corner_count)
-    one, other = _across_edges(corner_vertex, corner_edge, seam, np.flatnonzero(selected[corner_face]))
-    uv_vertex = _components(
-        corner_count, np.concatenate([one, following[one]]), np.concatenate([following[other], other])
-    )
-    face_island = _components(face_count, corner_face[one], corner_face[other])
+    chosen_corners = np.flatnonzero(selected[corner_face])
+    one, start, end = _across_edges(corner_vertex, corner_edge, following, seam, chosen_corners)
+    uv_vertex = _uv_vertices(one, start, end, following)
+    face_island = _components(face_count, corner_face[one], corner_face[start])
 
     corner_triangles = _without_doubled_diagonals(corner_triangles, following, uv_vertex)
     faces = _by_island(np.flatnonzero(selected), face_island)
-    corners = _by_island(np.flatnonzero(selected[corner_face]), face_island[corner_face])
+    corners = _by_island(chosen_corners, face_island[corner_face])
     triangle_face = corner_face[corner_triangles[:, 0]]
     triangles = _by_island(np.flatnonzero(selected[triangle_face]), face_island[triangle_face])
+
+    crowded = (np.bincount(corner_edge[chosen_corners], minlength=len(seam)) > 2) & ~seam
 
     islands = []
     island_vertex = np.empty(corner_count, dtype=np.intp)
@@ -64,6 +65,7 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
                 vertices=corner_vertex[own_corners[first]],
                 triangles=island_vertex[corner_triangles[own_triangles]],
                 triangle_corners=corner_triangles[own_triangles],
+                crowded_edges=int(crowded[corner_edge[own_corners]].sum()),
             )
         )
     return islands
@@ -73,11 +75,27 @@ def cuts(corner_vertex, corner_edge, face_start, edge_count, uv, tolerance=1e-6)
     """The edges (e,) bool where two faces meet in space and their corners' UVs (c, 2) do not."""
     corners = np.arange(len(corner_vertex))
     _, following = _around_faces(face_start, len(corners))
-    one, other = _across_edges(corner_vertex, corner_edge, np.zeros(edge_count, dtype=bool), corners)
-    gaps = np.abs(np.hstack([uv[one] - uv[following[other]], uv[following[one]] - uv[other]])).max(axis=1)
+    seam = np.zeros(edge_count, dtype=bool)
+    one, start, end = _across_edges(corner_vertex, corner_edge, following, seam, corners)
     cut = np.zeros(edge_count, dtype=bool)
-    cut[corner_edge[one[gaps > tolerance]]] = True
+    cut[corner_edge[one[_gaps(uv, one, start, end, following) > tolerance]]] = True
     return cut
+
+
+def attached(corner_vertex, corner_edge, face_start, seam, selected, uv, tolerance=1e-5):
+    """The corners (c,) bool of selected faces that hang on unselected ones: no seam parts them, nor do the UVs."""
+    corners = np.arange(len(corner_vertex))
+    corner_face, following = _around_faces(face_start, len(corners))
+    one, start, end = _across_edges(corner_vertex, corner_edge, following, seam, corners)
+    joined = _gaps(uv, one, start, end, following) <= tolerance
+    uv_vertex = _uv_vertices(one[joined], start[joined], end[joined], following)
+    is_selected = selected[corner_face]
+    unselected_there = np.bincount(uv_vertex, weights=~is_selected) > 0
+    return is_selected & unselected_there[uv_vertex]
+
+
+def _gaps(uv, one, start, end, following):
+    return np.abs(np.hstack([uv[one] - uv[start], uv[following[one]] - uv[end]])).max(axis=1)
 
 
 def _around_faces(face_start, corner_count):
@@ -89,13 +107,18 @@ def _around_faces(face_start, corner_count):
     return corner_face, following
 
 
-def _across_edges(corner_vertex, corner_edge, seam, corners):
-    """The pairs of corners (one on each side) whose edge joins two faces."""
+def _across_edges(corner_vertex, corner_edge, following, seam, corners):
+    """Where an edge joins two faces: the corner of one that starts it, and the other's corners at its start and end."""
     uses = np.bincount(corner_edge[corners], minlength=len(seam))
     inner = corners[((uses == 2) & ~seam)[corner_edge[corners]]]
     one, other = inner[np.argsort(corner_edge[inner], kind="stable")].reshape(-1, 2).T
-    opposite = corner_vertex[one] != corner_vertex[other]
-    return one[opposite], other[opposite]
+    alike = corner_vertex[one] == corner_vertex[other]  # both run the same way: one of the faces is inside out
+    return one, np.where(alike, other, following[other]), np.where(alike, following[other], other)
+
+
+def _uv_vertices(one, start, end, following):
+    """The UV vertex of each corner, where faces hang together as `_across_edges` says."""
+    return _components(len(following), np.concatenate([one, following[one]]), np.concatenate([start, end]))
 
 
 def _without_doubled_diagonals(triangles, following, uv_vertex):

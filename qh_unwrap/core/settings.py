@@ -61,7 +61,7 @@ _WEIGHTS = (
 class Settings:
     """How to unwrap.  Values are checked when the object is made; raises `SettingsError`."""
 
-    boundary: str = setting("CIRCLE", "Boundary", "The shape of the island's outline", choices=_BOUNDARY)
+    boundary: str = setting("FREE", "Boundary", "The shape of the island's outline", choices=_BOUNDARY)
     aspect: float = setting(
         1.0,
         "Aspect",

@@ -2,7 +2,9 @@
 import numpy as np
 import pytest
 
-from qh_unwrap.core.islands import cuts, find_islands
+from qh_unwrap.core.errors import DuplicateError, WindingError
+from qh_unwrap.core.islands import attached, cuts, find_islands
+from qh_unwrap.core.surface import Surface
 
 
 def mesh(faces, seams=()):
@@ -84,6 +86,7 @@ def test_pinched_island_splits_the_vertex():
 def test_edge_of_three_faces_bounds_islands():
     islands = split([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     assert [list(island.faces) for island in islands] == [[0], [1], [2]]
+    assert [island.crowded_edges for island in islands] == [1, 1, 1]
 
 
 def test_third_face_not_selected_does_not_matter():
@@ -91,13 +94,45 @@ def test_third_face_not_selected_does_not_matter():
     assert list(island.faces) == [0, 1]
 
 
-def test_opposite_winding_bounds_islands():
-    assert len(split([[0, 1, 2], [0, 1, 3]])) == 2
-    assert len(split([[0, 1, 2], [1, 0, 3]])) == 1
+def test_opposite_winding_stays_together():
+    """So that it is seen, and not taken for a seam."""
+    (island,) = split([[0, 1, 2], [0, 1, 3]])
+    assert len(island.vertices) == 4
+    with pytest.raises(WindingError):
+        Surface(np.random.default_rng(0).random((4, 3)), island.triangles)
 
 
-def test_duplicate_faces_are_islands_of_their_own():
-    assert len(split([[0, 1, 2], [0, 1, 2]])) == 2
+def test_duplicate_faces_stay_together():
+    (island,) = split([[0, 1, 2], [0, 1, 2]])
+    with pytest.raises(DuplicateError):
+        Surface(np.eye(3), island.triangles)
+
+
+def test_attached_corners():
+    """The left column of a grid of 3 x 3 quads is selected."""
+    faces = grid(3)
+    corner_vertex, corner_edge, start, seam, _ = mesh(faces)
+    points = np.array([(i, j) for i in range(4) for j in range(4)], dtype=float)
+    selected = np.arange(9) < 3
+    arguments = corner_vertex, corner_edge, start
+    shared = np.isin(corner_vertex, [4, 5, 6, 7]) & (np.arange(36) < 12)
+    uv = points[corner_vertex]
+    assert np.array_equal(attached(*arguments, seam, selected, uv), shared)
+    assert not attached(*arguments, seam, np.ones(9, dtype=bool), uv).any()
+    moved = uv.copy()
+    moved[:12] += 5
+    assert not attached(*arguments, seam, selected, moved).any(), "the UVs part them"
+    seam[corner_edge[[1, 5, 9]]] = True
+    assert not attached(*arguments, seam, selected, uv).any(), "seams part them"
+
+
+def test_attached_at_one_vertex_only():
+    """Faces that touch in a corner hang together there when others join them."""
+    faces = grid(2)
+    corner_vertex, corner_edge, start, seam, _ = mesh(faces)
+    uv = np.array([(i, j) for i in range(3) for j in range(3)], dtype=float)[corner_vertex]
+    found = attached(corner_vertex, corner_edge, start, seam, np.array([True, True, True, False]), uv)
+    assert set(corner_vertex[found]) == {4, 5, 7} and found[:4].sum() == 1
 
 
 def test_only_selected_faces():

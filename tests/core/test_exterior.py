@@ -179,6 +179,13 @@ def test_refusals_name_the_cure():
         free(vertices, triangles, None, pinned)
 
 
+def test_smallest_surfaces():
+    for vertices, triangles in ((np.eye(3), [[0, 1, 2]]), shapes.grid(1, 1), shapes.grid(2, 1, height=0.001)):
+        result = free(vertices, triangles)
+        assert result.report.injective
+        assert result.report.after.symmetric_dirichlet == pytest.approx(1, abs=1e-3)
+
+
 def test_results_without_pins_lie_in_the_unit_square():
     vertices, triangles = shapes.bump(6)
     result = free(vertices, triangles)

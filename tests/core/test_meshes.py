@@ -10,6 +10,7 @@ import pytest
 from qh_unwrap.core import Settings, Surface, errors, unwrap
 
 from ..benchmarks.common import load_mesh
+from .blender import triangulate
 
 FOLDER = Path(os.environ.get("QH_MESHES", "."))
 pytestmark = pytest.mark.skipif("QH_MESHES" not in os.environ, reason="QH_MESHES names no folder of meshes")
@@ -40,7 +41,7 @@ def test_circle_maps_have_no_flips(name, weights):
 
 @pytest.mark.parametrize("initial", ["HARMONIC", "UNIFORM", "MEAN_VALUE"])
 def test_the_papers_map_of_the_mannequin(initial):
-    settings = Settings(initial=initial, balance=0.5, iterations=10, tolerance=0, repair=False)
+    settings = Settings(boundary="CIRCLE", initial=initial, balance=0.5, iterations=10, tolerance=0, repair=False)
     after = unwrap(*load_mesh(FOLDER / "disk" / "mannequin-devil.off"), settings).report.after
     measured = (after.l2_stretch, after.angle, after.area, after.symmetric_dirichlet)
     np.testing.assert_allclose(measured, (2.158, 1.72, 1.48, 2.96), rtol=0.005)
@@ -48,7 +49,7 @@ def test_the_papers_map_of_the_mannequin(initial):
 
 
 def test_without_repair_the_mannequin_flips():
-    settings = Settings(iterations=10, tolerance=0, repair=False)
+    settings = Settings(boundary="CIRCLE", iterations=10, tolerance=0, repair=False)
     assert unwrap(*load_mesh(FOLDER / "disk" / "mannequin-devil.off"), settings).report.after.flips > 0
 
 
@@ -68,7 +69,7 @@ def test_broken_surfaces_are_named(name, error):
 
 
 def test_zero_area_triangles_of_a_scan_are_survived():
-    result = unwrap(*load_mesh(FOLDER / "broken" / "bad_zero_area_48.obj"))
+    result = unwrap(*load_mesh(FOLDER / "broken" / "bad_zero_area_48.obj"), triangulate=triangulate)
     assert any("zero area" in warning for warning in result.report.warnings)
     assert np.isfinite(result.uv).all() and result.report.after.flips == 0
 
@@ -76,6 +77,30 @@ def test_zero_area_triangles_of_a_scan_are_survived():
 @pytest.mark.parametrize("fill_holes", [True, False])
 @pytest.mark.parametrize("name", ["beetle_11loops.off", "capsule_quads_3loops.off", "halftunnel_quads_3loops.off"])
 def test_surfaces_with_holes(name, fill_holes):
-    result = unwrap(*load_mesh(FOLDER / "artist" / name), Settings(fill_holes=fill_holes))
+    result = unwrap(*load_mesh(FOLDER / "artist" / name), Settings(boundary="CIRCLE", fill_holes=fill_holes))
     assert result.report.after.flips == result.report.after.collapsed == 0
     assert result.report.after.symmetric_dirichlet < result.report.initial.symmetric_dirichlet
+
+
+@pytest.mark.parametrize("name", DISKS)
+def test_free_boundaries_are_certified(name):
+    result = unwrap(*load_mesh(FOLDER / "disk" / name), triangulate=triangulate)
+    assert result.report.injective and result.report.after.flips == 0
+    assert result.report.after.symmetric_dirichlet < result.report.initial.symmetric_dirichlet
+
+
+@pytest.mark.parametrize(
+    "name, most", [("camel_b.obj", 1.06), ("lilium.obj", 1.01), ("maze.obj", 1.01), ("hemisphere_pmp.off", 1.045)]
+)
+def test_free_boundaries_reach_the_least_distortion(name, most):
+    result = unwrap(*load_mesh(FOLDER / "disk" / name), Settings(iterations=30), triangulate=triangulate)
+    assert result.report.injective and result.report.after.symmetric_dirichlet < most
+
+
+@pytest.mark.parametrize(
+    "name, most",
+    [("beetle_11loops.off", 1.03), ("capsule_quads_3loops.off", 1.24), ("halftunnel_quads_3loops.off", 1.43)],
+)
+def test_free_boundaries_keep_holes_open(name, most):
+    result = unwrap(*load_mesh(FOLDER / "artist" / name), Settings(iterations=12), triangulate=triangulate)
+    assert result.report.injective and result.report.after.symmetric_dirichlet < most

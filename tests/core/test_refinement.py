@@ -23,7 +23,7 @@ def test_a_harmonic_map_of_the_refined_surface_has_no_flips():
     vertices, triangles = shapes.bump(3, inner=300)
     surface = Surface(vertices * [1, 0.2, 1], triangles)
     refined, _ = refine_obtuse(surface)
-    result = unwrap(refined.vertices, refined.triangles, Settings(initial="HARMONIC", iterations=0))
+    result = unwrap(refined.vertices, refined.triangles, Settings(boundary="CIRCLE", initial="HARMONIC", iterations=0))
     assert result.report.after.flips == 0
     assert len(result.uv) > len(vertices)
 

@@ -121,8 +121,10 @@ def test_an_isometry_is_a_fixed_point(seed):
 @given(seeds)
 def test_balance_one_is_the_harmonic_map_in_one_step(seed):
     vertices, triangles = shapes.bump(seed)
-    one_step = unwrap(vertices, triangles, Settings(balance=1, iterations=1, initial="UNIFORM", repair=False))
-    harmonic = unwrap(vertices, triangles, Settings(iterations=0, initial="HARMONIC"))
+    one_step = unwrap(
+        vertices, triangles, Settings(boundary="CIRCLE", balance=1, iterations=1, initial="UNIFORM", repair=False)
+    )
+    harmonic = unwrap(vertices, triangles, Settings(boundary="CIRCLE", iterations=0, initial="HARMONIC"))
     np.testing.assert_allclose(one_step.uv, harmonic.uv, atol=1e-12)
 
 
@@ -160,21 +162,21 @@ def test_a_folded_start_corrects_itself():
 
 def test_iteration_lowers_stretch_and_stops_when_it_no_longer_changes():
     vertices, triangles = shapes.hemisphere(10, flattening=2)
-    report = unwrap(vertices, triangles, Settings(iterations=100, tolerance=1e-4)).report
+    report = unwrap(vertices, triangles, Settings(boundary="CIRCLE", iterations=100, tolerance=1e-4)).report
     assert report.converged and report.iterations < 100
     assert report.changes[-1] <= 1e-4 < report.changes[-2]
     assert report.after.symmetric_dirichlet < report.initial.symmetric_dirichlet
-    unfinished = unwrap(vertices, triangles, Settings(iterations=2, tolerance=1e-4)).report
+    unfinished = unwrap(vertices, triangles, Settings(boundary="CIRCLE", iterations=2, tolerance=1e-4)).report
     assert not unfinished.converged and unfinished.iterations == len(unfinished.changes) == 2
 
 
 def test_steps_show_every_iteration_and_can_be_abandoned():
     vertices, triangles = shapes.hemisphere()
-    steps = unwrap_steps(vertices, triangles, Settings(iterations=4, tolerance=0))
+    steps = unwrap_steps(vertices, triangles, Settings(boundary="CIRCLE", iterations=4, tolerance=0))
     first = next(steps)
     assert first.iteration == 1 and first.uv.shape == (len(vertices), 2) and 0 < first.change < 1
     steps.close()
-    steps = unwrap_steps(vertices, triangles, Settings(iterations=4, tolerance=0))
+    steps = unwrap_steps(vertices, triangles, Settings(boundary="CIRCLE", iterations=4, tolerance=0))
     seen = []
     while True:
         try:
@@ -198,9 +200,9 @@ def rough(seed):
 @pytest.mark.parametrize("balance", [0.25, 0.5])
 def test_repair_turns_flipped_triangles_back(seed, balance):
     vertices, triangles = rough(seed)
-    plain = unwrap(vertices, triangles, Settings(repair=False, balance=balance))
+    plain = unwrap(vertices, triangles, Settings(boundary="CIRCLE", repair=False, balance=balance))
     assert plain.report.after.flips > 0
-    repaired = unwrap(vertices, triangles, Settings(balance=balance))
+    repaired = unwrap(vertices, triangles, Settings(boundary="CIRCLE", balance=balance))
     assert repaired.report.after.flips == repaired.report.after.collapsed == 0
 
 
@@ -209,7 +211,7 @@ def test_holes_are_filled_or_free():
     vertices[:, 2] = vertices[:, 0] ** 2
     for fill in (True, False):
         for weights in ("COTANGENT", "MEAN_VALUE"):
-            result = unwrap(vertices, triangles, Settings(fill_holes=fill, weights=weights))
+            result = unwrap(vertices, triangles, Settings(boundary="CIRCLE", fill_holes=fill, weights=weights))
             assert result.uv.shape == (len(vertices), 2)
             assert result.report.after.flips == 0 and result.report.after.symmetric_dirichlet < 1.1
 
@@ -220,7 +222,7 @@ def test_zero_area_faces_are_survived_with_a_warning():
     vertices[c] = (vertices[a] + vertices[b]) / 2
     for weights in ALL["weights"]:
         for initial in ALL["initial"]:
-            settings = Settings(weights=weights, initial=initial)
+            settings = Settings(boundary="CIRCLE", weights=weights, initial=initial)
             result = unwrap(vertices, triangles, settings, ellipse_uv(vertices))
             assert np.isfinite(result.uv).all() and result.report.after.l2_stretch < 10
             assert any("zero area" in warning for warning in result.report.warnings)
@@ -252,7 +254,7 @@ def test_refusals_name_the_cure():
         dict(weights="MEAN_VALUE_SCALAR", balance=1),
     ):
         with pytest.raises(errors.SettingsError, match="lower it"):
-            unwrap(vertices, triangles, Settings(**settings))
+            unwrap(vertices, triangles, Settings(boundary="CIRCLE", **settings))
     for pinned in (np.zeros(3, bool), np.zeros(len(vertices))):
         with pytest.raises(errors.PinError):
             unwrap(vertices, triangles, pinned=pinned)
@@ -283,7 +285,7 @@ def test_settings_defaults_are_in_range_and_described():
 
 def test_the_report_is_plain_data():
     vertices, triangles = shapes.bump(1)
-    report = unwrap(vertices, triangles, uv=ellipse_uv(vertices)).report
+    report = unwrap(vertices, triangles, Settings(boundary="CIRCLE"), ellipse_uv(vertices)).report
     again = json.loads(json.dumps(report.to_dict()))
     assert again["after"]["l2_stretch"] == report.after.l2_stretch
     assert again["iterations"] == len(again["changes"])

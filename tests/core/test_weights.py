@@ -121,7 +121,7 @@ def test_mean_value_weights_are_positive_even_on_folded_maps(seed, balance):
     rng = np.random.default_rng(seed)
     uv[rng.random(len(uv)) < 0.3] *= -1  # folds
     uv[surface.triangles[0]] = uv[surface.triangles[0, 0]]  # and a collapsed triangle
-    weights = scheme(Settings(weights="MEAN_VALUE", balance=balance))(Held(surface, None), uv)
+    weights = scheme(Settings(boundary="CIRCLE", weights="MEAN_VALUE", balance=balance))(Held(surface, None), uv)
     assert np.isfinite(weights).all() and (weights > 0).all()
     assert (mean_value(surface) > 0).all() and (uniform(surface) > 0).all()
 
@@ -129,7 +129,7 @@ def test_mean_value_weights_are_positive_even_on_folded_maps(seed, balance):
 def test_stretch_weights_accumulate():
     surface, uv = deformed(9)
     domain = Held(surface, None)
-    update = scheme(Settings(weights="STRETCH"))
+    update = scheme(Settings(boundary="CIRCLE", weights="STRETCH"))
     once = update(domain, uv)
     twice = update(domain, uv)
     np.testing.assert_allclose(twice / once, once / mean_value(surface), rtol=1e-12)

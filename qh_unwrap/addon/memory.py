@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much memory an island takes, and how much there is."""
+
+import ctypes
+import sys
+
+from ..core import UnwrapError
+
+_PER_VERTEX = 2000  # bytes: a factor of 1.35 kB, and the arrays
+
+
+class MemoryNeededError(UnwrapError):
+    """The island needs more memory than is free."""
+
+
+def check(vertices, free):
+    """Raise `MemoryNeededError` if so many vertices need more than the `free` bytes, None if these are not known."""
+    needed = vertices * _PER_VERTEX
+    if free is not None and needed > free:
+        raise MemoryNeededError(
+            f"it needs about {needed / 1e9:.1f} GB of memory and {free / 1e9:.1f} GB are free:"
+            " mark seams to cut it into smaller islands, or close other programs"
+        )
+
+
+def free():
+    """Bytes that programs can still take, None where the system does not say."""
+    if sys.platform == "linux":
+        return _free_on_linux()
+    if sys.platform == "win32":
+        return _free_on_windows()
+    return None
+
+
+def _free_on_linux():
+    try:
+        with open("/proc/meminfo", encoding="ascii") as lines:
+            found = [line.split() for line in lines if line.startswith("MemAvailable:")]
+    except OSError:
+        return None
+    return int(found[0][1]) * 1024 if found else None
+
+
+class _MemoryStatus(ctypes.Structure):
+    _fields_ = [("length", ctypes.c_uint32), ("load", ctypes.c_uint32)] + [
+        (name, ctypes.c_uint64)
+        for name in ("total", "available", "total_page", "available_page", "total_virtual", "available_virtual", "rest")
+    ]
+
+
+def _free_on_windows():
+    status = _MemoryStatus(length=ctypes.sizeof(_MemoryStatus))
+    done = ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))
+    return status.available_page if done else None

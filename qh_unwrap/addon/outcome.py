@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What became of the islands, for the report line, the panel and the command line; needs no Blender."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core import Distortion
+
+
+@dataclass
+class Outcome:
+    """What became of one island: its numbers, or the error that it failed with."""
+
+    obj: str
+    number: int
+    faces: int
+    area: float = 0.0
+    before: Distortion | None = None
+    after: Distortion | None = None  # of the UVs that Blender stores
+    iterations: int = 0
+    converged: bool = False
+    overlaps: tuple[str, ...] = ()  # what it lies on since it was unwrapped
+    warnings: tuple[str, ...] = ()
+    error: str = ""
+
+    @property
+    def label(self):
+        return f"{self.obj}, island {self.number} ({count(self.faces, 'face')})"
+
+    def to_dict(self):
+        """JSON-ready."""
+        values = dict(object=self.obj, island=self.number, faces=self.faces)
+        if self.error:
+            return values | dict(error=self.error)
+        return values | dict(
+            before=self.before and self.before.to_dict(),
+            after=self.after.to_dict(),
+            iterations=self.iterations,
+            converged=self.converged,
+            overlaps=list(self.overlaps),
+            warnings=list(self.warnings),
+        )
+
+
+def summary(outcomes):
+    """What happened in one line: "3 islands, stretch 1.310 → 1.090, no flips; 1 skipped: ..."."""
+    done = [outcome for outcome in outcomes if not outcome.error]
+    failed = [outcome for outcome in outcomes if outcome.error]
+    parts = []
+    if done:
+        stretch = _shown(_mean(done, [outcome.after.l2_stretch for outcome in done]))
+        if all(outcome.before for outcome in done):
+            before = _shown(_mean(done, [outcome.before.l2_stretch for outcome in done]))
+            stretch = f"{before} → {stretch}"
+        flips = sum(outcome.after.flips for outcome in done)
+        parts.append(f"{count(len(done), 'island')}, stretch {stretch}, {count(flips, 'flip')}")
+        overlapping = sum(bool(outcome.overlaps) for outcome in done)
+        if overlapping:
+            parts.append(f"{overlapping} on top of others")
+    if failed:
+        more = f" (and {len(failed) - 1} more)" if len(failed) > 1 else ""
+        first = f"{failed[0].label}: {failed[0].error}{more}"
+        parts.append(f"{len(failed)} skipped: {first}" if done else first)
+    return "; ".join(parts)
+
+
+def change(before, after, name):
+    """One measure of a `Distortion` before, if there was one, and after: "1.310 → 1.090"."""
+    new = _shown(getattr(after, name))
+    return f"{_shown(getattr(before, name))} → {new}" if before else new
+
+
+def count(number, noun):
+    return f"{number or 'no'} {noun}{'' if number == 1 else 's'}"
+
+
+def _shown(value):
+    return f"{value:.3f}" if value < 1e4 else f"{value:.1e}"
+
+
+def _mean(outcomes, values):
+    """Mean over the surface."""
+    return np.average(values, weights=[outcome.area for outcome in outcomes])

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which islands lie on top of each other in the plane."""
+
+import numpy as np
+
+_DEPTH = 1e-5  # of the size of the smaller triangle: what merely touches does not overlap
+_AT_ONCE = 1 << 20  # pairs of triangles looked at in one go
+
+
+def overlapping(islands):
+    """The pairs (i, j), i < j, of islands, each given as triangles (t, 3, 2), that share some area."""
+    boxes = np.array([(island.min(axis=(0, 1)), island.max(axis=(0, 1))) for island in islands])
+    found = []
+    for one, other in _meeting(boxes[:, 0], boxes[:, 1]):
+        pairs = zip(one.tolist(), other.tolist(), strict=True)
+        found += [(min(pair), max(pair)) for pair in pairs if overlap(*(islands[k] for k in pair))]
+    return sorted(found)
+
+
+def overlap(one, other):
+    """Whether triangles (s, 3, 2) share some area with triangles (t, 3, 2)."""
+    low = np.maximum(one.min(axis=(0, 1)), other.min(axis=(0, 1)))
+    high = np.minimum(one.max(axis=(0, 1)), other.max(axis=(0, 1)))
+    one, other = (each[_meets(each, low, high)] for each in (one, other))
+    if not len(one) or not len(other):
+        return False
+    both = np.concatenate([one, other])
+    for first, second in _meeting(both.min(axis=1), both.max(axis=1)):
+        apart = (first < len(one)) != (second < len(one))
+        if _share_area(both[first[apart]], both[second[apart]]).any():
+            return True
+    return False
+
+
+def _meets(triangles, low, high):
+    return ((triangles.max(axis=1) > low) & (triangles.min(axis=1) < high)).all(axis=1)
+
+
+def _meeting(low, high):
+    """Yield the pairs (k,), (k,) of boxes (n, 2) that overlap, some at a time; each pair comes once."""
+    order = np.argsort(low[:, 0], kind="stable")
+    low, high = low[order], high[order]
+    # Sorted by where they begin, those after a box meet it, along x, until one begins where it ends.
+    after = np.maximum(np.searchsorted(low[:, 0], high[:, 0]) - np.arange(len(low)) - 1, 0)
+    total = np.cumsum(after)
+    start = 0
+    while start < len(low):
+        stop = max(np.searchsorted(total, total[start] - after[start] + _AT_ONCE, side="right"), start + 1)
+        counts = after[start:stop]
+        one = np.repeat(np.arange(start, stop), counts)
+        other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts)
+        meet = (low[one, 1] < high[other, 1]) & (low[other, 1] < high[one, 1])
+        if meet.any():
+            yield order[one[meet]], order[other[meet]]
+        start = stop
+
+
+def _share_area(one, other):
+    """For pairs of triangles (k, 3, 2): whether no side of either has them on different sides of it."""
+    shared = np.ones(len(one), dtype=bool)
+    least = _DEPTH * np.minimum(np.ptp(one, axis=1).max(axis=1), np.ptp(other, axis=1).max(axis=1))
+    for sides in (np.roll(one, -1, axis=1) - one, np.roll(other, -1, axis=1) - other):
+        length = np.linalg.norm(sides, axis=2)
+        for side in range(3):
+            normal = sides[:, side, ::-1] * (1, -1) / np.maximum(length[:, side], 1e-300)[:, None]
+            first, second = (np.einsum("kcd,kd->kc", each, normal) for each in (one, other))
+            depth = np.minimum(first.max(axis=1), second.max(axis=1)) - np.maximum(
+                first.min(axis=1), second.min(axis=1)
+            )
+            shared &= (depth > least) | (length[:, side] == 0)
+    return shared
