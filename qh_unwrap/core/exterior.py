@@ -27,8 +27,8 @@ class Exterior:
     Parameters
     ----------
     surface : Surface
-    triangulate : function of points (p, 2) and sides (s, 2) that returns the triangles (t, 3) of a constrained
-        Delaunay triangulation of exactly these points, or None where that cannot be
+    triangulate : function of points (p, 2) and sides (s, 2) that returns the triangles (t, 3), all wound the same way,
+        of a constrained Delaunay triangulation of exactly these points, or None where that cannot be
     pinned : (n,) bool, vertices that stay where they are, or None
 
     After `renewed`, `surface` is the island with its air, whose vertices follow the island's, and `dirichlet` solves
@@ -62,6 +62,11 @@ class Exterior:
         self.dirichlet = Dirichlet(uv, self.surface.edges, np.concatenate([self._pinned, on_circle]), uv)
         self._quality = _quality(uv[triangles])
         return uv
+
+    def recalled(self, uv, n):
+        """An earlier map with new air around its first n vertices, or None where none can be made."""
+        self.dirichlet = None
+        return self.renewed(uv[:n])
 
     def balanced(self, uv, tensor):
         """The `tensor` (3, m), on the island times the factor that lets it press on the air as the air presses on it.
@@ -101,8 +106,8 @@ def make_air(uv, loops, triangulate):
     triangles = triangulate(points, sides)
     if triangles is None:
         return None
-    clockwise = signed_areas(points[triangles]) < 0
-    triangles[clockwise] = triangles[clockwise][:, ::-1]
+    if signed_areas(points[triangles]).sum() < 0:
+        triangles = triangles[:, ::-1]
     triangles = _outside(triangles, sides, len(points))
     if triangles is None or len(np.unique(triangles)) < len(points):
         return None
@@ -138,13 +143,16 @@ def _graded_points(start, end, centre, radius):
 
 def _within(points, start, end):
     """Which points (p, 2) lie within the closed polygons with the sides from `start` to `end`."""
-    result = np.zeros(len(points), bool)
-    rising = np.where(end[:, 1] == start[:, 1], np.inf, end[:, 1] - start[:, 1])
-    slope = (end[:, 0] - start[:, 0]) / rising
-    for first in range(0, len(points), 512):
-        x, y = points[first : first + 512].T[:, :, None]
-        crossed = ((start[:, 1] > y) != (end[:, 1] > y)) & (x < start[:, 0] + slope * (y - start[:, 1]))
-        result[first : first + 512] = crossed.sum(axis=1) % 2 == 1
+    height, row = np.unique(points[:, 1], return_inverse=True)
+    at, side = np.nonzero((start[:, 1] > height[:, None]) != (end[:, 1] > height[:, None]))
+    (x, y), (run, rise) = start[side].T, (end - start)[side].T
+    crossing = x + run / rise * (height[at] - y)
+    # From left to right and row by row, every side crossed leads in or out; each row ends outside.
+    order = np.lexsort((np.append(crossing, points[:, 0]), np.append(at, row)))
+    crossed = order < len(at)
+    inside = np.cumsum(crossed) % 2 == 1
+    result = np.empty(len(points), bool)
+    result[order[~crossed] - len(at)] = inside[~crossed]
     return result
 
 

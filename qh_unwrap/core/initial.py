@@ -65,31 +65,29 @@ def conformal(surface):
     """Conformal map with a natural boundary, (n, 2): the spectral one of Mullen, Tong, Alliez, Desbrun 2008.
 
     The smallest eigenvector, beside the constant, of Dirichlet energy less area against the boundary's mass, by
-    inverse iteration in complex numbers.
+    inverse iteration.
     """
     n = len(surface.vertices)
     edge = surface.half_edge_edges[surface.on_boundary]
     start, end = (ends[surface.on_boundary] for ends in surface.half_edges)
     length = np.linalg.norm(surface.vertices[end] - surface.vertices[start], axis=1)
     mass = (np.bincount(start, length, n) + np.bincount(end, length, n)) / 2
-    weights = cotangent(surface)
+    weights = cotangent(surface)[0]
     i, j = surface.edges.T
-    forward, backward = (-weights).astype(complex)
+    blocks = -weights[:, None, None] * np.eye(2)
     # The layout's area is the sum of Im(conj(z_start) z_end) / 2 over its outline.
-    turn = np.where(start < end, 0.5j, -0.5j)
-    forward[edge] += turn
-    backward[edge] -= turn
-    diagonal = np.bincount(i, weights[0], n) + np.bincount(j, weights[1], n)
-    shift = 1e-8 * diagonal.mean()
-    solve = System(surface.vertices, surface.edges).factor(forward, backward, diagonal + shift * mass)
+    blocks[edge] += np.where(start < end, 0.5, -0.5)[:, None, None] * np.array([[0, -1], [1, 0]])
+    diagonal = np.bincount(i, weights, n) + np.bincount(j, weights, n)
+    diagonal += 1e-8 * diagonal.mean() * mass
+    system = System(surface.vertices, surface.edges, width=2)
+    solve = system.factor(blocks, blocks.swapaxes(1, 2), diagonal[:, None, None] * np.eye(2))
     flat = project(surface)
     z = flat[:, 0] + 1j * flat[:, 1]
     for _ in range(50):
         previous = z
-        z = solve(mass * z)
+        z = solve((mass * z).view(float)).view(complex)
         z -= (mass @ z) / mass.sum()
         z /= np.sqrt(mass @ np.abs(z) ** 2)
-        turned = np.vdot(previous * mass, z)
-        if abs(turned) > 1 - 1e-10:
+        if abs(np.vdot(previous * mass, z)) > 1 - 1e-10:
             break
     return np.column_stack([z.real, z.imag])

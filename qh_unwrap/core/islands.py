@@ -57,6 +57,7 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
     for own_faces, own_corners, own_triangles in zip(faces, corners, triangles, strict=True):
         _, first, inverse = np.unique(uv_vertex[own_corners], return_index=True, return_inverse=True)
         island_vertex[own_corners] = inverse
+        own_edges = corner_edge[own_corners]
         islands.append(
             Island(
                 faces=own_faces,
@@ -65,7 +66,7 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
                 vertices=corner_vertex[own_corners[first]],
                 triangles=island_vertex[corner_triangles[own_triangles]],
                 triangle_corners=corner_triangles[own_triangles],
-                crowded_edges=int(crowded[corner_edge[own_corners]].sum()),
+                crowded_edges=len(np.unique(own_edges[crowded[own_edges]])),
             )
         )
     return islands

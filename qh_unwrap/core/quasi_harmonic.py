@@ -39,6 +39,9 @@ class Held:
     def renewed(self, uv):
         return uv
 
+    def recalled(self, uv, _n):
+        return uv
+
     def balanced(self, _uv, tensor):
         return tensor
 
@@ -88,14 +91,20 @@ def diameter(uv):
     return max(float(np.linalg.norm(np.ptp(uv, axis=0))), np.finfo(float).tiny)
 
 
-def energy(surface, uv, balance):
-    """What the iteration at a balance comes near to making least: symmetric Dirichlet at 0.25, area-weighted.
+def exponents(balance):
+    """p and r of the energy, the mean of `a^p b^r`, whose minimum the iteration at this balance comes near.
 
-    The mean of `a^p b^r` with `a = (s1/s2 + s2/s1) / 2` (angle) and `b = (s1 s2 + 1 / (s1 s2)) / 2` (area).
+    `a = (s1/s2 + s2/s1) / 2` measures the angles, `b = (s1 s2 + 1 / (s1 s2)) / 2` the areas of a triangle with the
+    stretches s1 and s2; p = r = 1 (balance 0.25) is the symmetric Dirichlet energy.
     """
+    return float(np.clip(4 * balance, 0.05, 1)), min(1.0, 4 / 3 * (1 - balance)) ** 3
+
+
+def energy(surface, uv, balance):
+    """The mean of `a^p b^r` over the surface, at equal areas of surface and layout."""
     larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
     angle = (np.sqrt(larger / smaller) + np.sqrt(smaller / larger)) / 2
     area = (np.sqrt(larger * smaller) + 1 / np.sqrt(larger * smaller)) / 2
-    p, r = np.clip(4 * balance, 0.05, 1), min(1.0, 4 / 3 * (1 - balance))
+    p, r = exponents(balance)
     share = np.where(surface.air | surface.degenerate, 0, surface.area)
     return float(share @ (angle**p * area**r) / share.sum())

@@ -16,25 +16,32 @@ class System:
     ----------
     points : (n, d), where the vertices are; only the ordering uses them
     edges : (k, 2)
+    width : unknowns of each vertex; entries are blocks (width, width)
     """
 
-    def __init__(self, points, edges):
+    def __init__(self, points, edges, width=1):
         n = len(points)
-        self._order = nested_dissection(points, edges)
+        order = nested_dissection(points, edges)
         place = np.empty(n, dtype=np.int64)
-        place[self._order] = np.arange(n)
+        place[order] = np.arange(n)
         i, j = place[edges].T
-        row = np.concatenate([i, j, place])
-        column = np.concatenate([j, i, place])
+        part = np.arange(width)
+        row = width * np.concatenate([i, j, place])[:, None, None] + part[:, None]
+        column = width * np.concatenate([j, i, place])[:, None, None] + part
+        row, column = (each.ravel() for each in np.broadcast_arrays(row, column))
+        self._order = (width * order[:, None] + part).ravel()
         self._entry = np.lexsort((row, column))
         self._indices = row[self._entry].astype(np.int32)
-        self._indptr = np.searchsorted(column[self._entry], np.arange(n + 1)).astype(np.int32)
+        self._indptr = np.searchsorted(column[self._entry], np.arange(width * n + 1)).astype(np.int32)
 
     def factor(self, forward, backward, diagonal):
-        """A solver of right-hand sides (n, ...) for the matrix with the entries (i, j), (j, i) and (i, i)."""
-        n = len(diagonal)
-        entries = np.concatenate([forward, backward, diagonal])[self._entry]
-        matrix = csc_array((entries, self._indices, self._indptr), shape=(n, n))
+        """A solver of right-hand sides (width * n, ...) for the matrix with the entries (i, j), (j, i) and (i, i).
+
+        Entries are (k, ...), (k, ...) and (n, ...), with blocks where `width` is not 1.
+        """
+        size = len(self._order)
+        entries = np.concatenate([forward, backward, diagonal]).ravel()[self._entry]
+        matrix = csc_array((entries, self._indices, self._indptr), shape=(size, size))
         # The order is ours, and the matrices are dominated by their diagonals: no column ordering, no pivoting.
         options = {"SymmetricMode": True}
         factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
@@ -60,6 +67,7 @@ class Dirichlet:
 
     def __init__(self, points, edges, held, values):
         self.held = held
+        self.points = points
         self.values = np.where(held[:, None], values, 0.0)
         self._edges = edges
         self._free = np.flatnonzero(~held)

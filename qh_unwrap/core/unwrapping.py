@@ -6,15 +6,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .boundary import held_vertices, outer_loop
+from .descent import descend
 from .distortion import Distortion, checked_uv, measure
 from .errors import BoundaryError, PinError, UVError
 from .exterior import Exterior
 from .initial import conformal, fit, initial_map, project
-from .quasi_harmonic import Held, check_settings, energy, iterate
+from .quasi_harmonic import Held, check_settings, diameter, energy, iterate
 from .settings import Settings
 from .solver import Dirichlet
 from .surface import Surface
 from .validity import enclosed_area, is_injective
+
+_HANDOVER = 0.3  # an iteration that lowers the energy by less than this part of it gives way to the refinement
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +31,9 @@ class Report:
     after: Distortion
     """Of the result."""
     iterations: int
+    """Those of the refinement included."""
     converged: bool
-    """The last iteration moved no vertex by more than the tolerance."""
+    """The last iteration moved no vertex by more than the tolerance, or the refinement no longer paid."""
     changes: tuple[float, ...]
     """For every iteration, the largest movement of a vertex by the layout's diameter."""
     injective: bool
@@ -104,19 +108,31 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
         domain, start, warnings = _held(surface, settings, given, pinned)
 
     changes, best, least = [], None, np.inf
+    refining = settings.refine and settings.iterations and settings.weights == "COTANGENT"
     for state in iterate(domain, settings, start, n):
-        state = replace(state, uv=state.uv[:n])
         if state.iteration:
             changes.append(state.change)
+            yield replace(state, uv=state.uv[:n] * mirror)
         # Repairs and new air make the energy rise and fall: keep the best valid map from then on.
-        uneven = state.repaired or settings.boundary == "FREE"
+        uneven = state.repaired or refining or settings.boundary == "FREE"
         if state.valid:
-            value = energy(surface, state.uv, settings.balance) if uneven else np.inf
+            value = energy(surface, state.uv[:n], settings.balance) if uneven else np.inf
+            gain = least - value
             if best is None or not uneven or value < least:
                 best, least = state, value
-        if state.iteration:
-            yield replace(state, uv=state.uv * mirror)
-    chosen = best.uv if best is not None and uneven else state.uv
+            if refining and len(changes) > 1 and gain < _HANDOVER * least:
+                break
+    if best is not None and uneven:
+        state = best
+    converged = bool(changes) and changes[-1] <= settings.tolerance
+    if refining and state.valid:
+        refined = domain.recalled(state.uv, n)
+        steps = () if refined is None else descend(domain, settings.balance, settings.refine, refined)
+        for refined, last in steps:
+            changes.append(float(np.linalg.norm(refined[:n] - state.uv[:n], axis=1).max() / diameter(refined[:n])))
+            state, converged = replace(state, iteration=len(changes), uv=refined, change=changes[-1]), last
+            yield replace(state, uv=refined[:n] * mirror)
+    chosen = state.uv[:n]
     if settings.boundary == "FREE" and not in_frame:
         chosen = (chosen - chosen.min(axis=0)) / np.ptp(chosen, axis=0).max()
 
@@ -127,7 +143,7 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
         initial=measure(surface, start[:n]),
         after=measure(surface, chosen),
         iterations=len(changes),
-        converged=bool(changes) and changes[-1] <= settings.tolerance,
+        converged=converged,
         changes=tuple(changes),
         injective=is_injective(chosen, surface.triangles, surface.loops),
         mirrored=bool(mirrored),
@@ -182,8 +198,18 @@ def _free(surface, settings, uv, pinned, triangulate):
         warnings = ("the start overlaps itself: begun with a circle",)
         with_air = exterior.renewed(start)
         if with_air is None:
-            raise PinError("the pins make the outline cross itself: unpin some, or move them")
+            return _outline_as_it_is(surface, start, pinned)
     return exterior, with_air, warnings
+
+
+def _outline_as_it_is(surface, start, pinned):
+    """The domain, initial map and warnings where no air can be made around the outline: it stays, and the pins do."""
+    held = pinned.copy()
+    held[np.concatenate(surface.loops)] = True
+    warning = "the outline stays as it is, too fine to be freed"
+    if pinned.any():
+        warning = "the pins make the outline cross itself: unpin some, or move them"
+    return Held(surface, Dirichlet(surface.vertices, surface.edges, held, start)), start, (warning,)
 
 
 def _natural_start(surface, settings, initial, uv):

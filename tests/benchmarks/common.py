@@ -17,7 +17,7 @@ import numpy as np
 from qh_unwrap.core import Settings, unwrap, unwrap_steps
 
 MESHES = "QH_MESHES"
-EXACT = {"boundary": "CIRCLE", "tolerance": 0, "repair": False}  # unless a benchmark says otherwise
+EXACT = {"boundary": "CIRCLE", "tolerance": 0, "refine": 0, "repair": False}  # unless a benchmark says otherwise
 
 
 def load_mesh(path):

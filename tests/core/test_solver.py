@@ -40,18 +40,19 @@ def test_everything_held():
     np.testing.assert_array_equal(dirichlet.solve(cotangent(surface)), values)
 
 
-def test_complex_systems():
+def test_systems_of_blocks():
     surface = Surface(*shapes.bump(1))
     n = len(surface.vertices)
     rng = np.random.default_rng(1)
-    off = rng.random(len(surface.edges)) + 1j * rng.random(len(surface.edges))
-    diagonal = np.full(n, 20.0 + 0j)
-    matrix = np.diag(diagonal)
     i, j = surface.edges.T
-    matrix[i, j], matrix[j, i] = off, off.conj()
-    rhs = rng.random(n) + 0j
-    solve = System(surface.vertices, surface.edges).factor(off, off.conj(), diagonal)
-    np.testing.assert_allclose(solve(rhs), np.linalg.solve(matrix, rhs), atol=1e-12)
+    off = rng.random((len(i), 2, 2))
+    diagonal = 20 * np.eye(2) + rng.random((n, 2, 2))
+    matrix = np.zeros((n, 2, n, 2))
+    matrix[i, :, j], matrix[j, :, i] = off, off.swapaxes(1, 2)
+    matrix[np.arange(n), :, np.arange(n)] = diagonal
+    rhs = rng.random(2 * n)
+    solve = System(surface.vertices, surface.edges, width=2).factor(off, off.swapaxes(1, 2), diagonal)
+    np.testing.assert_allclose(solve(rhs), np.linalg.solve(matrix.reshape(2 * n, 2 * n), rhs), atol=1e-12)
 
 
 def test_the_order_is_a_permutation_with_less_fill_than_the_generic_one():

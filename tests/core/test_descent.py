@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from qh_unwrap.core import Settings, Surface, distortion, unwrap
+from qh_unwrap.core.descent import _Energy
+from qh_unwrap.core.quasi_harmonic import energy
+
+from . import shapes
+from .blender import triangulate
+from .test_tensor import seeds
+
+
+def bent(seed):
+    """A surface, a map of it without flips, and a direction to change the map."""
+    vertices, triangles = shapes.bump(seed)
+    rng = np.random.default_rng(seed)
+    x, y, _ = vertices.T
+    uv = np.column_stack([x + 0.1 * np.sin(2 * y), 0.7 * y + 0.1 * x * x])
+    return Surface(vertices, triangles), uv, rng.normal(size=uv.shape)
+
+
+@given(seeds, st.floats(0, 1))
+def test_the_gradient_is_the_derivative_of_the_energy(seed, balance):
+    surface, uv, direction = bent(seed)
+    measure = _Energy(surface, uv, balance, 1.3)
+    gradient, _ = measure.derivatives(uv)
+    total = np.zeros_like(uv)
+    for corner in range(3):
+        np.add.at(total, surface.triangles[:, corner], gradient[corner].T)
+    step = 1e-6
+    difference = (measure.value(uv + step * direction) - measure.value(uv - step * direction)) / (2 * step)
+    assert (total * direction).sum() == pytest.approx(difference, rel=1e-4, abs=1e-6)
+
+
+def test_the_hessian_is_that_of_the_energy_where_it_is_positive():
+    vertices, triangles = shapes.random_disk(3)
+    surface = Surface(vertices, triangles)
+    rng = np.random.default_rng(3)
+    uv = surface.vertices[:, :2] + 1e-4 * rng.normal(size=(len(vertices), 2))  # near the minimum nothing is clamped
+    measure = _Energy(surface, uv, 0.25, 1.0)
+    direction = rng.normal(size=uv.shape)
+    _, blocks = measure.derivatives(uv)
+    quadratic = 0.0
+    for corner in range(3):
+        start, end = triangles[:, corner], triangles[:, (corner + 1) % 3]
+        apart = direction[start] - direction[end]
+        quadratic -= np.einsum("ti,ijt,tj->", apart, blocks[corner], apart)
+    step = 1e-3
+    values = [measure.value(uv + k * step * direction) for k in (-1, 0, 1)]
+    assert quadratic == pytest.approx((values[0] - 2 * values[1] + values[2]) / step**2, rel=1e-2)
+
+
+def test_steps_lower_the_energy_and_flip_nothing():
+    vertices, triangles = shapes.bump(4, inner=300, outer=50, height=2)
+    surface = Surface(vertices, triangles)
+    for boundary in ("CIRCLE", "FREE"):
+        rough = unwrap(vertices, triangles, Settings(boundary=boundary, refine=0), triangulate=triangulate)
+        result = unwrap(vertices, triangles, Settings(boundary=boundary), triangulate=triangulate)
+        assert result.report.injective and result.report.converged
+        assert energy(surface, result.uv, 0.25) < energy(surface, rough.uv, 0.25)
+
+
+def test_the_minimum_is_the_same_from_every_start():
+    vertices, triangles = shapes.hemisphere(8, flattening=1.5)
+    reached = [
+        unwrap(vertices, triangles, Settings(boundary="CIRCLE", refine=50, initial=initial, iterations=iterations)).uv
+        for initial in ("UNIFORM", "HARMONIC", "PROJECTION")
+        for iterations in (3, 12)
+    ]
+    for uv in reached[1:]:
+        np.testing.assert_allclose(uv, reached[0], atol=5e-3)
+
+
+def test_held_vertices_stay():
+    vertices, triangles = shapes.bump(5)
+    uv = vertices[:, :2] * [1.5, 1]
+    pinned = np.zeros(len(uv), bool)
+    pinned[[4, 30]] = True
+    kept = unwrap(vertices, triangles, Settings(boundary="KEEP"), uv, pinned)
+    rim = np.arange(len(uv)) >= 80
+    np.testing.assert_array_equal(kept.uv[rim | pinned], uv[rim | pinned])
+    free = unwrap(vertices, triangles, Settings(), uv, pinned, triangulate)
+    np.testing.assert_array_equal(free.uv[pinned], uv[pinned])
+    assert free.report.injective
+
+
+def test_the_slider_trades_areas_for_angles():
+    vertices, triangles = shapes.bump(6, inner=300, outer=50, height=2)
+    measured = [
+        unwrap(vertices, triangles, Settings(boundary="CIRCLE", balance=balance, refine=40)).report.after
+        for balance in (0, 0.25, 0.5, 0.75, 1)
+    ]
+    for less, more in pairwise(measured):
+        assert more.angle < less.angle and more.area > less.area
+
+
+def test_nothing_is_refined_where_the_map_has_flips_or_other_weights_are_chosen():
+    vertices, triangles = shapes.bump(7)
+    settings = Settings(boundary="CIRCLE", weights="MEAN_VALUE")
+    plain = unwrap(vertices, triangles, Settings(boundary="CIRCLE", weights="MEAN_VALUE", refine=0))
+    np.testing.assert_array_equal(unwrap(vertices, triangles, settings).uv, plain.uv)
+    uv = vertices[:, :2].copy()
+    pinned = np.zeros(len(uv), bool)
+    pinned[:40] = True
+    uv[:40] = uv[:40][::-1]
+    crossed = unwrap(vertices, triangles, Settings(), uv, pinned, triangulate)
+    assert crossed.report.after.flips > 0 and np.isfinite(crossed.uv).all()
+
+
+def test_extreme_starts_are_survived():
+    vertices, triangles = shapes.hemisphere(14, flattening=6)
+    tall = unwrap(vertices, triangles, Settings(boundary="CIRCLE"))
+    assert tall.report.after.flips == 0
+    assert tall.report.after.symmetric_dirichlet < 0.2 * tall.report.initial.symmetric_dirichlet
+    assert distortion(vertices, triangles, tall.uv).symmetric_dirichlet == tall.report.after.symmetric_dirichlet
