@@ -10,7 +10,6 @@ it has before a step as its rest shape (Jiang, Schaefer, Panozzo 2017), so that 
 import numpy as np
 
 from .quasi_harmonic import exponents
-from .solver import System
 from .surface import signed_areas
 from .tensor import area_scale, edge_matrix
 from .validity import invalid
@@ -20,7 +19,7 @@ _SMALLEST = 1e-9  # eigenvalue of the Hessian's triangles
 _LONGEST = 0.9  # of the step at which a triangle collapses
 _ARMIJO = 1e-4
 _HALVINGS = 20
-_NEGLIGIBLE = 3e-4  # a decrease of the energy by this part of it is not worth a step
+_NEGLIGIBLE = 1e-3  # a decrease of the energy by this part of it is not worth a step
 
 
 def descend(domain, balance, steps, uv):
@@ -158,11 +157,8 @@ class _Newton:
 
     def __init__(self, domain):
         self.surface = domain.surface
-        free = ~domain.dirichlet.held
-        self._free = np.flatnonzero(free)
-        edges = self.surface.edges
-        self._inner = np.flatnonzero(free[edges].all(axis=1))
-        self._system = System(domain.dirichlet.points[free], (np.cumsum(free) - 1)[edges[self._inner]], width=2)
+        self._free, self._inner = domain.dirichlet.free, domain.dirichlet.inner
+        self._system = domain.dirichlet.system(width=2)
 
     def direction(self, energy, uv):
         """The gradient and the direction of descent, (n, 2) each, zero where held."""

@@ -58,8 +58,10 @@ class Exterior:
             return None if self.dirichlet is None else uv
         points, on_circle, triangles = air
         uv = np.vstack([uv[:n], points])
-        self.surface = self._island.with_air(triangles, len(points))
-        self.dirichlet = Dirichlet(uv, self.surface.edges, np.concatenate([self._pinned, on_circle]), uv)
+        self.surface = self._island.with_air(triangles, uv)
+        self.dirichlet = Dirichlet(
+            self.surface.order, self.surface.edges, np.concatenate([self._pinned, on_circle]), uv
+        )
         self._quality = _quality(uv[triangles])
         return uv
 

@@ -79,7 +79,7 @@ def conformal(surface):
     blocks[edge] += np.where(start < end, 0.5, -0.5)[:, None, None] * np.array([[0, -1], [1, 0]])
     diagonal = np.bincount(i, weights, n) + np.bincount(j, weights, n)
     diagonal += 1e-8 * diagonal.mean() * mass
-    system = System(surface.vertices, surface.edges, width=2)
+    system = System(surface.order, surface.edges, width=2)
     solve = system.factor(blocks, blocks.swapaxes(1, 2), diagonal[:, None, None] * np.eye(2))
     flat = project(surface)
     z = flat[:, 0] + 1j * flat[:, 1]

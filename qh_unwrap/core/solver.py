@@ -10,18 +10,17 @@ _LEAF = 4
 
 
 class System:
-    """Sparse matrices on one graph: ordered once, factorized for every new set of entries.
+    """Sparse matrices on one graph, factorized for every new set of entries.
 
     Parameters
     ----------
-    points : (n, d), where the vertices are; only the ordering uses them
+    order : (n,), in which the vertices are eliminated
     edges : (k, 2)
     width : unknowns of each vertex; entries are blocks (width, width)
     """
 
-    def __init__(self, points, edges, width=1):
-        n = len(points)
-        order = nested_dissection(points, edges)
+    def __init__(self, order, edges, width=1):
+        n = len(order)
         place = np.empty(n, dtype=np.int64)
         place[order] = np.arange(n)
         i, j = place[edges].T
@@ -59,21 +58,25 @@ class Dirichlet:
 
     Parameters
     ----------
-    points : (n, d), where the vertices are; only the ordering uses them
+    order : (n,), in which the vertices are eliminated
     edges : (k, 2)
     held : (n,) bool
     values : (n, 2), used where `held`
     """
 
-    def __init__(self, points, edges, held, values):
+    def __init__(self, order, edges, held, values):
         self.held = held
-        self.points = points
         self.values = np.where(held[:, None], values, 0.0)
+        self.free = np.flatnonzero(~held)
+        self.inner = np.flatnonzero(~held[edges].any(axis=1))
         self._edges = edges
-        self._free = np.flatnonzero(~held)
-        local = np.cumsum(~held) - 1
-        self._inner = np.flatnonzero(~held[edges].any(axis=1))
-        self._system = System(points[self._free], local[edges[self._inner]])
+        self._order = order
+        self._system = self.system()
+
+    def system(self, width=1):
+        """A `System` of the free vertices, in their order, and of the edges `inner` between them."""
+        local = np.cumsum(~self.held) - 1
+        return System(local[self._order[~self.held[self._order]]], local[self._edges[self.inner]], width)
 
     def diagonal(self, weights):
         """The sum of the weights around every vertex, (n,)."""
@@ -83,7 +86,7 @@ class Dirichlet:
 
     def solve(self, weights):
         """All vertices (n, 2), for the weights (2, k)."""
-        if not len(self._free):
+        if not len(self.free):
             return self.values.copy()
         i, j = self._edges.T
         n = len(self.held)
@@ -91,10 +94,10 @@ class Dirichlet:
             np.bincount(i, weights[0] * known[j], n) + np.bincount(j, weights[1] * known[i], n)
             for known in self.values.T
         ]
-        forward, backward = -weights[:, self._inner]
-        solve = self._system.factor(forward, backward, self.diagonal(weights)[self._free])
+        forward, backward = -weights[:, self.inner]
+        solve = self._system.factor(forward, backward, self.diagonal(weights)[self.free])
         result = self.values.copy()
-        result[self._free] = solve(np.column_stack(rhs)[self._free])
+        result[self.free] = solve(np.column_stack(rhs)[self.free])
         return result
 
 

@@ -9,6 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from . import errors
+from .solver import nested_dissection
 
 # A triangle lower than this part of its longest edge has no area, for all that single precision can tell.
 _FLATTEST = 1e-6
@@ -163,6 +164,11 @@ class Surface:
         return sorted(loops, key=lambda loop: (-round(perimeter(self.vertices[loop]), 12), loop[0]))
 
     @cached_property
+    def order(self):
+        """The order in which systems on the surface eliminate its vertices, (n,)."""
+        return nested_dissection(self.vertices, self.edges)
+
+    @cached_property
     def boundary_angle_deficit(self):
         """How far the outer boundary turns at each vertex of `loops[0]`: pi less the sum of its angles, in radians."""
         angles = corner_angles(self.flat)
@@ -184,16 +190,17 @@ class Surface:
         closed.air[len(self.triangles) :] = air
         return closed
 
-    def with_air(self, triangles, count):
-        """The surface with `triangles` (t, 3) of air, which use `count` more vertices after its own."""
+    def with_air(self, triangles, uv):
+        """The surface with `triangles` (t, 3) of air, whose vertices in the layout `uv` follow its own."""
         wider = copy.copy(self)
-        wider.vertices = np.pad(self.vertices, ((0, count), (0, 0)))
+        wider.vertices = np.pad(self.vertices, ((0, len(uv) - len(self.vertices)), (0, 0)))
         wider.triangles = np.vstack([self.triangles, triangles])
         wider._number_edges()
         some_shape = np.broadcast_to([[0.0, 0], [1, 0], [0, 1]], (len(triangles), 3, 2))
         wider.flat = np.concatenate([self.flat, some_shape])
         wider.area, wider.degenerate = (np.pad(each, (0, len(triangles))) for each in (self.area, self.degenerate))
         wider.air = np.pad(self.air, (0, len(triangles)), constant_values=True)
+        wider.order = nested_dissection(uv, wider.edges)
         del wider.loops, wider.on_boundary  # those of the surface alone
         return wider
 

@@ -122,15 +122,16 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
                 best, least = state, value
             if refining and len(changes) > 1 and gain < _HANDOVER * least:
                 break
+    last = state
     if best is not None and uneven:
         state = best
     converged = bool(changes) and changes[-1] <= settings.tolerance
     if refining and state.valid:
-        refined = domain.recalled(state.uv, n)
+        refined = state.uv if state is last else domain.recalled(state.uv, n)
         steps = () if refined is None else descend(domain, settings.balance, settings.refine, refined)
-        for refined, last in steps:
+        for refined, done in steps:
             changes.append(float(np.linalg.norm(refined[:n] - state.uv[:n], axis=1).max() / diameter(refined[:n])))
-            state, converged = replace(state, iteration=len(changes), uv=refined, change=changes[-1]), last
+            state, converged = replace(state, iteration=len(changes), uv=refined, change=changes[-1]), done
             yield replace(state, uv=refined[:n] * mirror)
     chosen = state.uv[:n]
     if settings.boundary == "FREE" and not in_frame:
@@ -166,7 +167,7 @@ def _held(surface, settings, uv, pinned):
     held, values, warnings = held_vertices(surface, settings, uv, pinned)
     solid = surface if settings.boundary == "KEEP" else surface.filled(air=not settings.fill_holes)
     added = len(solid.vertices) - len(surface.vertices)
-    dirichlet = Dirichlet(solid.vertices, solid.edges, np.pad(held, (0, added)), np.pad(values, ((0, added), (0, 0))))
+    dirichlet = Dirichlet(solid.order, solid.edges, np.pad(held, (0, added)), np.pad(values, ((0, added), (0, 0))))
     initial = settings.initial
     if initial == "AUTO":
         initial = "CURRENT" if settings.boundary == "KEEP" and _is_valid(surface, uv) else "MEAN_VALUE"
@@ -209,7 +210,7 @@ def _outline_as_it_is(surface, start, pinned):
     warning = "the outline stays as it is, too fine to be freed"
     if pinned.any():
         warning = "the pins make the outline cross itself: unpin some, or move them"
-    return Held(surface, Dirichlet(surface.vertices, surface.edges, held, start)), start, (warning,)
+    return Held(surface, Dirichlet(surface.order, surface.edges, held, start)), start, (warning,)
 
 
 def _natural_start(surface, settings, initial, uv):

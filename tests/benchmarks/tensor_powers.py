@@ -69,7 +69,7 @@ def literal_series(surface, uv, iterations):
     """The maps (n, 2) that the literal eq. (10) makes from `uv`; its tensor, on the surface, is C^-q at q = -1."""
     held = np.zeros(len(surface.vertices), bool)
     held[surface.loops[0]] = True
-    dirichlet = Dirichlet(surface.vertices, surface.edges, held, uv)
+    dirichlet = Dirichlet(surface.order, surface.edges, held, uv)
     series = [uv]
     for _ in range(iterations):
         series.append(dirichlet.solve(cotangent(surface, tensor=surface_tensor(surface, series[-1], 0.5, power=-1))))

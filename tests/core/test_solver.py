@@ -21,7 +21,7 @@ def test_solutions_equal_dense_ones(seed):
     held[surface.loops[0]] = True
     held[rng.integers(n, size=3)] = True
     values = rng.random((n, 2))
-    dirichlet = Dirichlet(surface.vertices, surface.edges, held, values)
+    dirichlet = Dirichlet(surface.order, surface.edges, held, values)
     for weights in (cotangent(surface), mean_value(surface)):
         matrix = np.zeros((n, n))
         i, j = surface.edges.T
@@ -36,7 +36,7 @@ def test_solutions_equal_dense_ones(seed):
 def test_everything_held():
     surface = Surface(*shapes.grid(1, 1))
     values = np.random.default_rng(0).random((4, 2))
-    dirichlet = Dirichlet(surface.vertices, surface.edges, np.ones(4, bool), values)
+    dirichlet = Dirichlet(surface.order, surface.edges, np.ones(4, bool), values)
     np.testing.assert_array_equal(dirichlet.solve(cotangent(surface)), values)
 
 
@@ -51,7 +51,7 @@ def test_systems_of_blocks():
     matrix[i, :, j], matrix[j, :, i] = off, off.swapaxes(1, 2)
     matrix[np.arange(n), :, np.arange(n)] = diagonal
     rhs = rng.random(2 * n)
-    solve = System(surface.vertices, surface.edges, width=2).factor(off, off.swapaxes(1, 2), diagonal)
+    solve = System(surface.order, surface.edges, width=2).factor(off, off.swapaxes(1, 2), diagonal)
     np.testing.assert_allclose(solve(rhs), np.linalg.solve(matrix.reshape(2 * n, 2 * n), rhs), atol=1e-12)
 
 
