@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""
+What an artist sees, step by step in Blender's window: menus, redo panel, sidebars, reports.
+
+Not a pytest file: a harness that runs inside Blender calls `steps(gui)` and lets Blender redraw for as many seconds as
+each step yields.  `gui` opens workspaces and sidebars, moves the pointer, presses keys and takes screenshots.
+"""
+
+import bpy  # isort: skip  (the wheel knows bmesh only after this)
+import bmesh
+import numpy as np
+
+
+def steps(gui):
+    gui.workspace("UV Editing")
+    yield 1
+    _add(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
+    _show_checker(gui)
+    yield 2
+
+    # The operator from the menu of the 3D View
+    before = _uvs()
+    yield from _open_menu(gui, 'VIEW_3D')
+    gui.shot("1_menu_view_3d.png")
+    gui.key("q")
+    yield 2
+    assert not np.array_equal(_uvs(), before), "the menu entry did nothing"
+    gui.shot("2_report.png")
+    gui.click(*gui.xy(gui.region(gui.area('VIEW_3D'), "HUD"), 0.3, 0.5))
+    yield 3
+    gui.shot("3_redo_panel.png")
+    gui.click(*gui.xy(gui.region(gui.area('VIEW_3D'), "HUD"), 0.3, 0.04))
+    yield 1
+
+    # and of the UV Editor
+    with gui.override('IMAGE_EDITOR'):
+        bpy.ops.image.view_all(fit_view=True)
+    yield 1
+    yield from _open_menu(gui, 'IMAGE_EDITOR')
+    gui.shot("4_menu_image_editor.png")
+    gui.key("Escape")
+    yield 1
+    overlay = gui.area('VIEW_3D').spaces.active.overlay
+    overlay.show_overlays = False
+    yield 1
+    gui.shot("5_layout_with_checker.png")
+    overlay.show_overlays = True
+
+    # The sidebars, whose button uses the settings of the scene
+    for number, editor in enumerate(('VIEW_3D', 'IMAGE_EDITOR'), start=6):
+        gui.sidebar(editor)
+        yield 1
+        gui.sidebar(editor, "QH Unwrap")
+        yield 1
+        gui.shot(f"{number}_sidebar_{editor.lower()}.png")
+    for section in ("Advanced", "Mesh"):
+        gui.click(*_button(gui, 'VIEW_3D', _BUTTONS[section]))
+        yield 1
+    gui.shot("8_sidebar_with_all_sections.png")
+
+    bpy.context.scene.qh_unwrap.placement = 'PACK'
+    before = _uvs()
+    gui.click(*_button(gui, 'IMAGE_EDITOR', _BUTTONS["Unwrap"]))
+    yield 2
+    gui.shot("9_no_uvs_selected.png")
+    gui.key("Escape")
+    with gui.override('IMAGE_EDITOR'):
+        bpy.ops.uv.select_all(action='SELECT')
+    gui.move('IMAGE_EDITOR', fy=0.95)  # away from the message
+    yield 1
+    gui.click(*_button(gui, 'IMAGE_EDITOR', _BUTTONS["Unwrap"]))
+    yield 2
+    gui.shot("10_packed_by_the_button.png")
+    assert not np.array_equal(_uvs(), before), "the button did nothing"
+    assert _uvs().min() >= 0 and _uvs().max() <= 1, "not packed: ESC, pressed before, stops Blender's packer"
+    gui.key("ctrl+z")
+    yield 2
+    assert np.array_equal(_uvs(), before), "undo did not restore"
+
+    # What goes wrong is said
+    _add(gui, bpy.ops.mesh.primitive_cube_add, lambda one, other: False)
+    yield 1
+    gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Unwrap"]))
+    yield 2
+    gui.shot("11_error.png")
+    gui.move('VIEW_3D', fx=0.2, fy=0.9)
+    yield 2
+    gui.area('IMAGE_EDITOR').type = 'INFO'
+    yield 1
+    gui.shot("12_reports.png")
+
+
+_BUTTONS = {"Unwrap": 43, "Mesh": 240, "Advanced": 265}  # pixels below the top of the sidebar
+
+
+def _add(gui, add, is_seam):
+    """Alone in the scene, in Edit Mode, all selected."""
+    with gui.override('VIEW_3D'):
+        if bpy.context.mode != 'OBJECT':
+            bpy.ops.object.mode_set(mode='OBJECT')
+        bpy.ops.object.select_all(action='SELECT')
+        bpy.ops.object.delete()
+        add(calc_uvs=False)
+        bpy.ops.object.mode_set(mode='EDIT')
+        bpy.ops.mesh.select_all(action='SELECT')
+        mesh = bpy.context.object.data
+        bm = bmesh.from_edit_mesh(mesh)
+        for edge in bm.edges:
+            edge.seam = is_seam(*(vertex.co for vertex in edge.verts))
+        bmesh.update_edit_mesh(mesh)
+        bpy.ops.view3d.view_axis(type='FRONT')
+        bpy.ops.view3d.view_selected()
+
+
+def _is_seam(one, other):
+    """The middle of the back of the head."""
+    return abs(one.x) + abs(other.x) < 1e-4 and one.y + other.y > -0.5
+
+
+def _show_checker(gui):
+    image = bpy.data.images.new("Checker", 1024, 1024)
+    image.generated_type = 'COLOR_GRID'
+    material = bpy.data.materials.new("Checker")
+    material.use_nodes = True
+    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    shader = material.node_tree.nodes["Principled BSDF"]
+    material.node_tree.links.new(texture.outputs["Color"], shader.inputs["Base Color"])
+    material.node_tree.nodes.active = texture
+    bpy.context.object.data.materials.append(material)
+    gui.area('VIEW_3D').spaces.active.shading.color_type = 'TEXTURE'
+    gui.area('IMAGE_EDITOR').spaces.active.image = image
+    gui.area('IMAGE_EDITOR').spaces.active.show_region_toolbar = False
+
+
+def _open_menu(gui, editor):
+    """U, and the Unwrap submenu on top of it."""
+    gui.move(editor, fx=0.3, fy=0.3)
+    yield 0.5
+    gui.key("u")
+    yield 1
+    if editor == 'VIEW_3D':
+        gui.key("Right")
+        yield 1
+
+
+def _button(gui, editor, below_top):
+    x, y = gui.xy(gui.region(gui.area(editor), "UI"), 0.4, 0)
+    return x, y + below_top
+
+
+def _uvs():
+    bm = bmesh.from_edit_mesh(bpy.context.object.data)
+    layer = bm.loops.layers.uv.active
+    return np.array([loop[layer].uv[:] for face in bm.faces for loop in face.loops]) if layer else np.empty((0, 2))
