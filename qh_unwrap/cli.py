@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from . import __version__
-from .addon.options import Placement
+from .addon.options import MeshOptions
 from .core import Settings, UnwrapError
 
 _DESCRIPTION = "Unwrap meshes with little distortion and without flipped faces."
@@ -57,8 +57,8 @@ def _parser():
     parser.add_argument("--preview", type=Path, metavar="FILE.png", help="draw the model and its UVs, checkered")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    for kind in (Settings, Placement):
-        group = parser.add_argument_group(kind.__name__.lower())
+    for title, kind in (("unwrapping", Settings), ("mesh and placement", MeshOptions)):
+        group = parser.add_argument_group(title)
         for field in dataclasses.fields(kind):
             group.add_argument(f"--{field.name.replace('_', '-')}", **_argument(field))
     return parser
@@ -81,14 +81,14 @@ def _argument(field):
 
 def _run(args):
     try:
-        settings, placement = (_made_from(args, kind) for kind in (Settings, Placement))
+        settings, options = (_made_from(args, kind) for kind in (Settings, MeshOptions))
     except UnwrapError as error:
         raise _UsageError(error) from None
     try:
         import bpy
     except ImportError:
         raise _UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
-    from .addon import files, preview, selection, unwrapping
+    from .addon import files, outcome, preview, selection, unwrapping
 
     _check_files(args, files)
     with _at_file("read", args.input, files):
@@ -97,8 +97,8 @@ def _run(args):
     files.prepare(objects, weld=args.weld, seams_from_islands=args.seams_from_islands)
     targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
     with files.quiet():
-        outcomes = _drain(unwrapping.unwrap_targets(targets, settings, placement, bpy.context))
-    _print_table(outcomes, unwrapping.change)
+        outcomes = _drain(unwrapping.unwrap_targets(targets, settings, options, bpy.context))
+    _print_table(outcomes, outcome.change)
 
     done = [outcome for outcome in outcomes if not outcome.error]
     if args.output and done:
@@ -109,7 +109,7 @@ def _run(args):
             preview.render(objects, outcomes, args.preview)
     if args.json:
         with _at_file("write", args.json, files):
-            document = _document(args, settings, placement, outcomes, bpy.app.version_string)
+            document = _document(args, settings, options, outcomes, bpy.app.version_string)
             files.write_text(args.json, json.dumps(document, indent=2) + "\n")
     return 0 if done and len(done) == len(outcomes) else 1
 
@@ -194,11 +194,11 @@ def _row(outcome, change):
     )
 
 
-def _document(args, settings, placement, outcomes, blender_version):
+def _document(args, settings, options, outcomes, blender_version):
     return dict(
         versions=dict(qh_unwrap=__version__, blender=blender_version),
         input=str(args.input),
         output=str(args.output) if args.output else None,
-        settings=dataclasses.asdict(settings) | dataclasses.asdict(placement),
+        settings=dataclasses.asdict(settings) | dataclasses.asdict(options),
         islands=[outcome.to_dict() for outcome in outcomes],
     )

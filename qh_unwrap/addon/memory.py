@@ -51,4 +51,4 @@ class _MemoryStatus(ctypes.Structure):
 def _free_on_windows():
     status = _MemoryStatus(length=ctypes.sizeof(_MemoryStatus))
     done = ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))
-    return status.available_page if done else None
+    return status.available if done else None

@@ -26,8 +26,9 @@ class MeshArrays:
     aspect: np.ndarray  # (f,) width by height of the image on each face
 
 
-def read(obj, options=MeshOptions()):
+def read(obj, options=None):
     """The object's mesh as arrays, in any mode; does not change it."""
+    options = options or MeshOptions()
     layer = obj.data.uv_layers.active
     name = layer.name if layer else None
     if obj.mode != 'EDIT':
@@ -115,13 +116,20 @@ def _aspect(material):
 def write(obj, corners, uv):
     """Give the corners their UVs, in a new map "UVMap" if there is none.  Call it `in_object_mode`."""
     mesh = obj.data
-    layer = mesh.uv_layers.active or mesh.uv_layers.new(name="UVMap")
+    layer = _active_or_new_map(mesh)
     if layer is None:
         raise UnwrapError("Blender could not add a UV map: remove one of the mesh's UV maps or attributes")
     values = _get(layer.uv, "vector", np.float32, 2)
     values[corners] = uv
-    layer.uv.foreach_set("vector", values.ravel())
+    if bpy.app.version >= (5, 0, 0):  # where `mesh.attributes` would spoil the selection of UVs
+        layer.uv.foreach_set("vector", values.ravel())
+    else:  # where `layer.uv` would write into arrays that undo steps and copies of the mesh share
+        layer.data.foreach_set("uv", values.ravel())
     mesh.update()
+
+
+def _active_or_new_map(mesh):
+    return mesh.uv_layers.active or mesh.uv_layers.new(name="UVMap")
 
 
 @contextmanager

@@ -5,16 +5,17 @@ import bpy
 
 from ..core.errors import SettingsError
 from . import properties, selection
-from .unwrapping import summary, unwrap_targets
+from .outcome import summary
+from .unwrapping import unwrap_targets
 
 last_outcomes = []  # of the latest run, for the panels
 
 
-class QH_OT_unwrap(properties.SettingsProperties, bpy.types.Operator):
+class QH_OT_unwrap(properties.OperatorProperties, bpy.types.Operator):
     """Unwrap the selected faces, in Object Mode all faces, with little distortion and without flipping any"""
 
     bl_idname = "uv.qh_unwrap"
-    bl_label = "Quasi-Harmonic"
+    bl_label = "Quasi-Harmonic Unwrap"
     bl_options = {'REGISTER', 'UNDO'}
 
     @classmethod
@@ -29,17 +30,22 @@ class QH_OT_unwrap(properties.SettingsProperties, bpy.types.Operator):
     def draw(self, _context):
         properties.draw(self.layout, self)
 
+    def invoke(self, context, _event):
+        """From a menu: with the panel's settings.  Scripts come to `execute`, with the defaults."""
+        self.take_unset_from(context.scene.qh_unwrap)
+        return self.execute(context)
+
     def execute(self, context):
         targets = selection.targets(context)
         if not targets:
-            self.report({'ERROR'}, "No faces are selected")
+            self.report({'ERROR'}, selection.nothing_selected(context))
             return {'CANCELLED'}
         try:
-            settings, placement = self.settings(), self.placement_settings()
+            settings, options = self.settings(), self.mesh_options()
         except SettingsError as error:
             self.report({'ERROR'}, str(error))
             return {'CANCELLED'}
-        outcomes = _with_progress(context.window_manager, unwrap_targets(targets, settings, placement, context))
+        outcomes = _with_progress(context.window_manager, unwrap_targets(targets, settings, options, context))
         last_outcomes[:] = outcomes
         for outcome in outcomes:
             for warning in outcome.warnings:
@@ -48,7 +54,7 @@ class QH_OT_unwrap(properties.SettingsProperties, bpy.types.Operator):
         if failed == len(outcomes):
             self.report({'ERROR'}, summary(outcomes))
             return {'CANCELLED'}
-        clean = not failed and not any(outcome.after.flips for outcome in outcomes)
+        clean = not failed and all(outcome.is_clean for outcome in outcomes)
         self.report({'INFO'} if clean else {'WARNING'}, summary(outcomes))
         return {'FINISHED'}
 

@@ -13,7 +13,12 @@ _PLACEMENT = (
         "Where the islands were, as large, as turned and as mirrored as before; new ones stand upright in the 0 to 1"
         " square, or in a tile beside it if that is taken",
     ),
-    Choice("PACK", "Pack", "All islands get the same texel density and are packed into the 0 to 1 square"),
+    Choice(
+        "PACK",
+        "Pack",
+        "All islands get the same texel density and are packed into the 0 to 1 square by Blender, which may take a"
+        " minute",
+    ),
     Choice("UNIT", "Unit Square", "Each island fills the 0 to 1 square"),
 )
 
@@ -45,7 +50,7 @@ class MeshOptions:
     )
     use_subsurf_data: bool = setting(
         False,
-        "Use Subdivision Surface",
+        "Use Subsurf",
         "Unwrap the mesh as its Subdivision Surface modifier smooths it; the modifier may stand anywhere, others do"
         " not count",
     )

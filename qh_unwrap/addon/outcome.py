@@ -28,6 +28,11 @@ class Outcome:
     def label(self):
         return f"{self.obj}, island {self.number} ({count(self.faces, 'face')})"
 
+    @property
+    def is_clean(self):
+        """Unwrapped, with nothing flipped, collapsed or on top of another."""
+        return not self.error and not (self.after.flips or self.after.collapsed or self.overlaps)
+
     def to_dict(self):
         """JSON-ready."""
         values = dict(object=self.obj, island=self.number, faces=self.faces)

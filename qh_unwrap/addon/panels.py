@@ -6,11 +6,12 @@ import textwrap
 import bpy
 
 from . import operators, properties
-from .unwrapping import change, count
+from .outcome import change, count
 
 
 def draw_menu(menu, _context):
-    menu.layout.operator("uv.qh_unwrap")
+    menu.layout.separator()
+    menu.layout.operator("uv.qh_unwrap", text="Quasi-Harmonic")
 
 
 class _Panel:
@@ -44,7 +45,7 @@ class _ReportPanel:
                 for text in textwrap.wrap(outcome.error, _WIDTH):
                     column.label(text=text, icon='BLANK1')
                 continue
-            column.label(text=outcome.label, icon='CHECKMARK')
+            column.label(text=outcome.label, icon='CHECKMARK' if outcome.is_clean else 'ERROR')
             for text in _lines(outcome):
                 column.label(text=text, icon='BLANK1')
         if len(outcomes) > _SHOWN:
@@ -52,14 +53,11 @@ class _ReportPanel:
 
 
 _SHOWN = 12  # islands
-_WIDTH = 40  # characters
+_WIDTH = 32  # characters
 
 
 def _lines(outcome):
-    before, after = outcome.before, outcome.after
-    for label, name in (("Stretch", "l2_stretch"), ("Angle", "angle"), ("Area", "area")):
-        yield f"{label} {change(before, after, name)}"
-    yield f"{count(after.flips, 'flip')}, {count(outcome.iterations, 'iteration')}"
+    yield f"Stretch {change(outcome.before, outcome.after, 'l2_stretch')}, {count(outcome.after.flips, 'flip')}"
     for warning in outcome.warnings:
         yield from textwrap.wrap(warning, _WIDTH)
 

@@ -3,8 +3,11 @@
 
 import bpy
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from ..core import UnwrapError
+
+_STEEPEST_FLAT = 0.5  # an island that climbs less than this, by the way along it, has no upper end
 
 
 def says_where(corners):
@@ -33,6 +36,53 @@ def in_place(uv, triangles, old):
     return np.column_stack([moved.real, moved.imag]) + old_centre
 
 
+def is_mirrored(corners):
+    """Whether most of these UVs, given as triangles (t, 3, 2), are."""
+    return _signed_areas(corners).sum() < 0
+
+
+def upright(uv, vertices, triangles, up):
+    """Turn `uv` (n, 2) so that what is up in space is up; where it lies too flat for that, to its smallest box."""
+    corners, heights = uv[triangles], (vertices @ up)[triangles]
+    weight = np.abs(_signed_areas(corners))
+    offset = (corners - _centre(corners)) * np.sqrt(area(vertices, triangles) / weight.sum())
+    weights = np.repeat(weight[:, None], 3, axis=1)
+    # The slope of the height over the layout, by least squares.
+    spread = np.einsum("tc,tci,tcj->ij", weights, offset, offset)
+    slope = np.linalg.lstsq(spread, np.einsum("tc,tci,tc->i", weights, offset, heights), rcond=None)[0]
+    if np.linalg.norm(slope) > _STEEPEST_FLAT:
+        return _turned(uv, 1j / complex(*(slope / np.linalg.norm(slope))))
+    return _on_smallest_box(uv)
+
+
+def _on_smallest_box(uv):
+    """Turned so that its bounding box is the smallest, and lies rather than stands."""
+    try:
+        outline = uv[ConvexHull(uv).vertices]
+    except QhullError:
+        return uv
+    side = (np.roll(outline, -1, axis=0) - outline) @ (1, 1j)
+    turns = np.abs(side[side != 0]) / side[side != 0]
+    extents = np.array([np.ptp(_turned(outline, turn), axis=0) for turn in turns])
+    best = np.argmin(extents.prod(axis=1))
+    width, height = extents[best]
+    return _turned(uv, turns[best] * (1 if width >= height else -1j))
+
+
+def _turned(uv, turn):
+    z = uv @ (1, 1j) * turn
+    return np.column_stack([z.real, z.imag])
+
+
+def free_tile(rest):
+    """The first tile to the right, 0 for the unit square itself, that has nothing of the UVs (k, 2) in or beside it."""
+    least = 1e-6
+    across = rest[(rest[:, 1] > least) & (rest[:, 1] < 1 - least), 0]
+    if not len(across) or across.max() < least or across.min() > 1 - least:
+        return 0
+    return int(np.ceil(across.max() - least))
+
+
 def in_unit_square(uv):
     """Scale `uv` (n, 2) until its longer side is 1, in the middle of the 0 to 1 square."""
     low, size = uv.min(axis=0), np.ptp(uv, axis=0)
@@ -40,11 +90,12 @@ def in_unit_square(uv):
     return (uv - low) * scale + (1 - size * scale) / 2
 
 
-def pack(islands, margin, context):
+def pack(islands, options, tight, context):
     """Lay islands, given as (vertices, triangles, uv), out beside one another in the unit square by Blender's packer.
 
-    They get the same texel density.  Blender packs what is selected in Edit Mode, so this happens on a mesh and in a
-    scene of its own, where no one's selection is disturbed.  Raises `UnwrapError` if Blender does not.
+    They get the same texel density.  If `tight`, they are turned by right angles and nest, which may take Blender a
+    minute; else their boxes lie side by side.  Blender packs what is selected in Edit Mode, so this happens on a mesh
+    and in a scene of its own, where no one's selection is disturbed.  Raises `UnwrapError` if Blender does not.
     """
     mesh, corner_vertices = _soup(islands)
     scene = bpy.data.scenes.new("QH Unwrap")
@@ -53,21 +104,31 @@ def pack(islands, margin, context):
         scene.collection.objects.link(obj)
         view_layer = scene.view_layers[0]
         view_layer.objects.active = obj
-        scene.tool_settings.use_uv_select_sync = True
-        with context.temp_override(scene=scene, view_layer=view_layer, active_object=obj, object=obj, edit_object=obj):
+        if not scene.tool_settings.use_uv_select_sync:  # set in Blender 5, where setting it changes selections
+            scene.tool_settings.use_uv_select_sync = True
+        with context.temp_override(
+            scene=scene,
+            view_layer=view_layer,
+            active_object=obj,
+            object=obj,
+            edit_object=obj,
+            area=None,  # an image editor would have the islands packed into the tile where they lie
+            region=None,
+        ):
+            bpy.ops.ptcache.bake_all(bake=False)  # forgets an ESC pressed before, at which the packer silently stops
             bpy.ops.object.mode_set(mode='EDIT')
             bpy.ops.mesh.select_all(action='SELECT')
             bpy.ops.uv.average_islands_scale()
             done = bpy.ops.uv.pack_islands(
                 udim_source='CLOSEST_UDIM',
-                rotate=True,
+                rotate=tight,
                 rotate_method='CARDINAL',
                 scale=True,
                 merge_overlap=False,
-                margin_method='SCALED',
-                margin=margin,
+                margin_method=options.margin_method,
+                margin=options.margin,
                 pin=False,
-                shape_method='CONVEX',
+                shape_method='CONCAVE' if tight else 'AABB',
             )
             bpy.ops.object.mode_set(mode='OBJECT')
         if done != {'FINISHED'}:
@@ -105,6 +166,11 @@ def _signed_areas(corners):
     a, b, c = corners.transpose(1, 0, 2)
     (x1, y1), (x2, y2) = (b - a).T, (c - a).T
     return (x1 * y2 - x2 * y1) / 2
+
+
+def area(vertices, triangles):
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
 
 
 def _centre(corners):

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender properties made from the fields of `Settings` and `Placement`, shared by operator, scene and panels."""
+"""Blender properties made from the fields of `Settings` and `MeshOptions`, shared by operator, scene and panels."""
 
 import dataclasses
 
 import bpy
 
 from ..core import Settings
-from .options import Placement
+from .options import MeshOptions
 
 
-def _property(field):
+def _property(field, options=frozenset()):
     meta = field.metadata
-    common = dict(name=meta["label"], description=meta["description"], default=field.default)
+    common = dict(name=meta["label"], description=meta["description"], default=field.default, options=set(options))
     if meta["choices"]:
         items = [(choice.identifier, choice.label, choice.description) for choice in meta["choices"]]
         return bpy.props.EnumProperty(items=items, **common)
@@ -24,19 +24,19 @@ def _property(field):
     return bpy.props.FloatProperty(precision=4 if soft_high < 1 else 3, **limits, **common)
 
 
-FIELDS = (*dataclasses.fields(Settings), *dataclasses.fields(Placement))
+FIELDS = (*dataclasses.fields(Settings), *dataclasses.fields(MeshOptions))
 
 
 class SettingsProperties:
-    """Mix-in with one property per field of `Settings` and `Placement`."""
+    """Mix-in with one property per field of `Settings` and `MeshOptions`."""
 
     __annotations__ = {field.name: _property(field) for field in FIELDS}
 
     def settings(self):
         return _made_from(self, Settings)
 
-    def placement_settings(self):
-        return _made_from(self, Placement)
+    def mesh_options(self):
+        return _made_from(self, MeshOptions)
 
     def as_keywords(self):
         """All of them by name, as a script would pass them to the operator."""
@@ -52,22 +52,56 @@ def _value(value):
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
+class OperatorProperties(SettingsProperties):
+    """The same for an operator, which forgets them after each run."""
+
+    __annotations__ = {field.name: _property(field, {'SKIP_SAVE'}) for field in FIELDS}
+
+    def take_unset_from(self, other):
+        """What the caller did not set comes from `other`."""
+        for field in FIELDS:
+            if not self.properties.is_property_set(field.name):
+                setattr(self, field.name, getattr(other, field.name))
+
+
+_SECTIONS = {
+    "Layout": ('placement', 'margin_method', 'margin'),
+    "Mesh": ('fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data'),
+    "Advanced": ('refine', 'tolerance', 'initial', 'repair', 'tensor_power'),
+}
+
+
 def draw(layout, owner):
-    """One row per property; what does not apply to the other choices is greyed out."""
+    """A row for each property, the rarer ones in sections that fold; what does not apply is greyed out."""
     layout.use_property_split = True
     layout.use_property_decorate = False
-    for field in FIELDS:
+    in_sections = {name for names in _SECTIONS.values() for name in names}
+    _draw_rows(layout, owner, [field.name for field in FIELDS if field.name not in in_sections])
+    for title, names in _SECTIONS.items():
+        header, body = layout.panel(f"qh_unwrap_{title.lower()}", default_closed=title != "Layout")
+        header.label(text=title)
+        if body:
+            _draw_rows(body, owner, names)
+
+
+def _draw_rows(layout, owner, names):
+    for name in names:
+        if name == 'aspect' and owner.boundary != 'RECTANGLE':
+            continue
         row = layout.row()
-        row.active = _applies(owner, field.name)
-        row.prop(owner, field.name)
+        row.active = _applies(owner, name)
+        row.prop(owner, name)
 
 
 def _applies(owner, name):
+    placed = owner.boundary != 'KEEP'
     return {
-        'aspect': owner.boundary == 'RECTANGLE',
+        'refine': owner.weights == 'COTANGENT',
         'repair': owner.weights == 'COTANGENT',
-        'placement': owner.boundary != 'KEEP',
-        'margin': owner.boundary != 'KEEP' and owner.placement != 'UNIT',
+        'fill_holes': owner.boundary not in ('KEEP', 'FREE'),
+        'placement': placed,
+        'margin': placed and owner.placement != 'UNIT',
+        'margin_method': placed and owner.placement != 'UNIT',
     }.get(name, True)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 class Target(NamedTuple):
     obj: bpy.types.Object
     faces: np.ndarray  # (f,) bool, the faces to unwrap
+    stays_attached: bool = False  # to the other faces of its islands
 
 
 def mesh_objects(context):
@@ -33,8 +34,17 @@ def distinct_meshes(objects):
 
 def targets(context):
     """The faces that the person selected, of each object that has any."""
-    found = [Target(obj, _selected(obj, context)) for obj in mesh_objects(context)]
+    attached = context.mode == 'EDIT_MESH' and _in_uv_editor(context)
+    found = [Target(obj, _selected(obj, context), attached) for obj in mesh_objects(context)]
     return [target for target in found if target.faces.any()]
+
+
+def nothing_selected(context):
+    """Why there is nothing to unwrap, and what to do."""
+    by_uvs = not context.scene.tool_settings.use_uv_select_sync
+    if context.mode == 'EDIT_MESH' and _in_uv_editor(context) and by_uvs:
+        return "No faces are selected: press A in the UV Editor, or turn on UV Sync Selection"
+    return "No faces are selected"
 
 
 def visible_faces(mesh):
@@ -51,9 +61,13 @@ def _selected(obj, context):
     return np.fromiter((rule(face) and not face.hide for face in bm.faces), dtype=bool, count=len(bm.faces))
 
 
+def _in_uv_editor(context):
+    return isinstance(context.space_data, bpy.types.SpaceImageEditor)
+
+
 def _rule(bm, context):
     uv_layer = bm.loops.layers.uv.active
-    if uv_layer is None or not isinstance(context.space_data, bpy.types.SpaceImageEditor):
+    if uv_layer is None or not _in_uv_editor(context):
         return _in_mesh
     sync = context.scene.tool_settings.use_uv_select_sync
     if bpy.app.version < (5, 0, 0):

@@ -1,63 +1,43 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Unwrapping the chosen faces of objects: read, split into islands, unwrap each, place, write."""
 
+import dataclasses
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ..core import Distortion, UnwrapError, distortion, unwrap_steps
-from ..core.errors import UVError
-from ..core.islands import Island, find_islands
-from . import mesh_arrays, placing
+from ..core import Settings, UnwrapError, distortion, unwrap_steps
+from ..core.errors import BoundaryError, UVError
+from ..core.islands import Island, attached, find_islands
+from ..core.validity import orientation
+from . import memory, mesh_arrays, placing
 from .delaunay import triangulate
+from .outcome import Outcome, count
+from .overlaps import overlap, overlapping
 from .selection import Target
 
 
 @dataclass
-class Outcome:
-    """What became of one island: its numbers, or the error that it failed with."""
-
-    obj: str
-    number: int
-    faces: int
-    area: float = 0.0
-    before: Distortion | None = None
-    after: Distortion | None = None  # of the UVs that Blender stores
-    iterations: int = 0
-    converged: bool = False
-    warnings: tuple[str, ...] = ()
-    error: str = ""
-
-    @property
-    def label(self):
-        return f"{self.obj}, island {self.number} ({count(self.faces, 'face')})"
-
-    def to_dict(self):
-        """JSON-ready."""
-        values = dict(object=self.obj, island=self.number, faces=self.faces)
-        if self.error:
-            return values | dict(error=self.error)
-        return values | dict(
-            before=self.before and self.before.to_dict(),
-            after=self.after.to_dict(),
-            iterations=self.iterations,
-            converged=self.converged,
-            warnings=list(self.warnings),
-        )
-
-
-@dataclass
 class _Work:
-    """One island on its way through."""
+    """One island on its way through.  Its UVs have the proportions of the image, so that lengths in them are true."""
 
     target: Target
     mesh: mesh_arrays.MeshArrays
     island: Island
     outcome: Outcome
+    settings: Settings
+    attached: np.ndarray  # (c,) bool, the mesh's corners that hang on faces that are not unwrapped
     uv: np.ndarray | None = None  # (n, 2) the new ones
     mirrored: bool = False
+    in_frame: bool = False  # of the old UVs, because something of them is held
+
+    @cached_property
+    def aspect(self):
+        """(2,) what to multiply UVs with: of the image that most faces show."""
+        values, counts = np.unique(self.mesh.aspect[self.island.faces], return_counts=True)
+        return np.array([values[np.argmax(counts)], 1.0])
 
     @cached_property
     def old_uv(self):
@@ -69,17 +49,29 @@ class _Work:
             return None
         uv = np.empty((len(self.island.vertices), 2))
         uv[self.island.corner_vertex] = corner_uv
-        return uv
+        return uv * self.aspect
+
+    @property
+    def old_triangles(self):
+        """The triangles' old UVs (t, 3, 2), None if they do not say where the island belongs."""
+        if self.old_uv is None:
+            return None
+        old = self.mesh.uv[self.island.triangle_corners] * self.aspect
+        return old if placing.says_where(old) else None
 
     @property
     def vertices(self):
         return self.mesh.vertices[self.island.vertices]
 
     @property
+    def triangles(self):
+        return self.island.triangles
+
+    @property
     def corner_uv(self):
         """The new UVs (c, 2) of its corners; where a vertex stayed, its corners stay to the last bit."""
-        uv = self.uv[self.island.corner_vertex]
-        if self.old_uv is not None and not self.is_cut:
+        uv = (self.uv / self.aspect)[self.island.corner_vertex]
+        if self.in_frame:
             stayed = (self.uv == self.old_uv).all(axis=1)[self.island.corner_vertex]
             uv[stayed] = self.mesh.uv[self.island.corners[stayed]]
         return uv
@@ -87,66 +79,99 @@ class _Work:
     @property
     def is_cut(self):
         """Whether the old UVs have cuts where there is no seam."""
-        gap = self.old_uv[self.island.corner_vertex] - self.mesh.uv[self.island.corners]
+        gap = self.old_uv[self.island.corner_vertex] - self.mesh.uv[self.island.corners] * self.aspect
         return np.abs(gap).max() > 1e-5 * np.ptp(self.old_uv, axis=0).max()
 
     @property
     def pinned(self):
-        pinned = np.zeros(len(self.island.vertices), dtype=bool)
-        pinned[self.island.corner_vertex[self.mesh.pinned[self.island.corners]]] = True
-        return pinned if pinned.any() else None
+        return self._vertices_of(self.mesh.pinned)
+
+    @property
+    def hanging(self):
+        return self._vertices_of(self.attached)
+
+    def _vertices_of(self, corners):
+        chosen = np.zeros(len(self.island.vertices), dtype=bool)
+        chosen[self.island.corner_vertex[corners[self.island.corners]]] = True
+        return chosen
 
 
-def unwrap_targets(targets, settings, placement, context):
+def unwrap_targets(targets, settings, options, context):
     """Unwrap the targets' faces.  A generator: yields (iterations done, iterations at most), returns the outcomes.
 
     An island that fails is left as it was, and its outcome says why; nothing is written before all are done.
     """
-    works = []
-    for target in targets:
-        mesh = mesh_arrays.read(target.obj)
-        islands = find_islands(
-            mesh.corner_vertex, mesh.corner_edge, mesh.face_start, mesh.seam, target.faces, mesh.corner_triangles
-        )
-        for number, island in enumerate(islands, start=1):
-            works.append(_Work(target, mesh, island, Outcome(target.obj.name, number, len(island.faces))))
-
+    works = [work for target in targets for work in _works(target, settings, options)]
     rounds = settings.iterations + 1
     for done, work in enumerate(works):
         yield done * rounds, len(works) * rounds
         try:
-            steps = _unwrap(work, settings)
+            steps = _unwrap(work)
             for iteration in steps:
                 yield done * rounds + iteration, len(works) * rounds
         except UnwrapError as error:
             work.outcome.error = str(error)
+        except MemoryError:
+            work.outcome.error = "the memory ran out: mark seams to cut it into smaller islands"
 
-    _place([work for work in works if work.uv is not None], settings, placement, context)
+    _place([work for work in works if work.uv is not None], works, options, context)
     placed = [work for work in works if work.uv is not None]
     if placed:
+        if options.placement != 'UNIT':
+            _report_overlaps(placed, works)
         with mesh_arrays.in_object_mode(context):
             for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
                 _write(obj, list(group))
     return [work.outcome for work in works]
 
 
-def _unwrap(work, settings):
-    uv = work.old_uv
-    if uv is not None and work.is_cut:
-        if settings.boundary == "KEEP" or settings.initial == "CURRENT":
-            raise UVError("its UVs are cut where there is no seam; mark the cuts with UV > Seams from Islands")
-        uv = None
-    steps = unwrap_steps(work.vertices, work.island.triangles, settings, uv=uv, pinned=work.pinned, triangulate=triangulate)
-    result = yield from _iterations(steps)
+def _works(target, settings, options):
+    obj, faces, stays_attached = target
+    mesh = mesh_arrays.read(obj, options)
+    topology = mesh.corner_vertex, mesh.corner_edge, mesh.face_start, mesh.seam, faces
+    hanging = np.zeros(len(mesh.corner_vertex), dtype=bool)
+    if stays_attached and mesh.uv is not None:
+        hanging = attached(*topology, mesh.uv)
+    for number, island in enumerate(find_islands(*topology, mesh.corner_triangles), start=1):
+        yield _Work(target, mesh, island, Outcome(obj.name, number, len(island.faces)), settings, hanging)
+
+
+def _unwrap(work):
+    memory.check(len(work.vertices), memory.free())
+    hanging = work.hanging if work.old_triangles is not None else np.zeros(len(work.vertices), dtype=bool)
+    try:
+        result = yield from _result(work, hanging)
+    except (BoundaryError, UVError) as error:
+        if not hanging.any():
+            raise
+        raise type(error)(f"{error} (faces that are not selected hang on it: or select all of its island)") from None
     work.uv = result.uv
-    work.outcome.before = result.report.before
+    work.mirrored = result.report.mirrored
+    work.outcome.before, work.outcome.after = result.report.before, result.report.after
     work.outcome.iterations = result.report.iterations
     work.outcome.converged = result.report.converged
-    work.outcome.warnings = tuple(result.report.warnings)
-    work.mirrored = result.report.mirrored
+    work.outcome.warnings += tuple(result.report.warnings)
+    if not (result.report.injective or result.report.after.flips or result.report.after.collapsed):
+        work.outcome.warnings += ("it overlaps itself",)
+    if work.island.crowded_edges:
+        edges = count(work.island.crowded_edges, "edge")
+        work.outcome.warnings += (f"it ends at {edges} where more than two faces meet",)
 
 
-def _iterations(steps):
+def _result(work, hanging):
+    settings, uv, pinned = work.settings, work.old_uv, work.pinned
+    if hanging.any():
+        if settings.boundary == 'FREE':
+            pinned |= hanging
+        elif settings.boundary != 'KEEP':
+            settings = dataclasses.replace(settings, boundary='KEEP')
+            work.outcome.warnings += ("its outline is kept, since faces that are not selected hang on it",)
+    work.in_frame = settings.boundary == 'KEEP' or (settings.boundary == 'FREE' and pinned.any())
+    if uv is not None and work.is_cut:
+        if work.in_frame or settings.initial == 'CURRENT':
+            raise UVError("its UVs are cut where there is no seam: mark the cuts with UV > Seams from Islands")
+        uv = None
+    steps = unwrap_steps(work.vertices, work.triangles, settings, uv=uv, pinned=pinned, triangulate=triangulate)
     while True:
         try:
             state = next(steps)
@@ -155,29 +180,90 @@ def _iterations(steps):
         yield state.iteration
 
 
-def _place(works, settings, placement, context):
-    if settings.boundary == "KEEP":
-        return
-    loose = []
+def _place(works, all_works, options, context):
+    new, packed = [], []
     for work in works:
-        old = None if work.mesh.uv is None else work.mesh.uv[work.island.triangle_corners]
-        if placement.placement == "UNIT":
-            work.uv = placing.in_unit_square(work.uv)
-        elif placement.placement == "ORIGINAL" and old is not None and placing.says_where(old):
-            work.uv = placing.in_place(work.uv, work.island.triangles, old)
+        if work.in_frame:
+            continue
+        old = work.old_triangles
+        work.mirrored = old is not None and placing.is_mirrored(old)
+        if work.mirrored:
+            work.uv = work.uv * (-1, 1)
+        if options.placement == 'UNIT':
+            work.uv = placing.in_unit_square(work.uv / work.aspect) * work.aspect
+        elif options.placement == 'PACK':
+            packed.append(work)
+        elif old is not None:
+            work.uv = placing.in_place(work.uv, work.triangles, old)
         else:
-            loose.append(work)
-    if not loose:
+            work.uv = placing.upright(work.uv, work.vertices, work.triangles, work.mesh.up)
+            new.append(work)
+    _pack(packed, options, True, context)
+    if new:
+        _pack(new, options, False, context)
+        tile = placing.free_tile(np.concatenate([np.empty((0, 2)), *_others(new, all_works)]))
+        for work in new:
+            if work.uv is not None:
+                work.uv = work.uv + (tile, 0) * work.aspect
+
+
+def _pack(works, options, tight, context):
+    if not works:
         return
     try:
-        islands = [(work.vertices, work.island.triangles, work.uv) for work in loose]
-        packed = placing.pack(islands, placement.margin, context)
+        islands = [(work.vertices, work.triangles, work.uv) for work in works]
+        packed = placing.pack(islands, options, tight, context)
     except UnwrapError as error:
-        packed = [None] * len(loose)
-        for work in loose:
+        packed = [None] * len(works)
+        for work in works:
             work.outcome.error = str(error)
-    for work, uv in zip(loose, packed, strict=True):
+    for work, uv in zip(works, packed, strict=True):
         work.uv = uv
+
+
+def _others(works, all_works):
+    """The UVs (k, 2) of everything else in the works' meshes, where they mean anything."""
+    mine = {id(work) for work in works}
+    for work in all_works:
+        if id(work) not in mine and work.uv is not None:
+            yield work.uv / work.aspect
+        elif id(work) not in mine and work.old_triangles is not None:
+            yield work.old_uv / work.aspect
+    yield from (rest.reshape(-1, 2) for _, rest in _rests(all_works))
+
+
+def _rests(works):
+    """For each mesh, the faces that are not to be unwrapped, as triangles (t, 3, 2), where their UVs mean anything."""
+    for obj, group in itertools.groupby(works, key=lambda work: work.target.obj):
+        work = next(group)
+        mesh, faces = work.mesh, work.target.faces
+        if mesh.uv is not None and not faces.all():
+            corner_face = np.repeat(np.arange(len(faces)), np.diff(mesh.face_start, append=len(mesh.corner_vertex)))
+            rest = mesh.uv[mesh.corner_triangles[~faces[corner_face[mesh.corner_triangles[:, 0]]]]]
+            if placing.says_where(rest):
+                yield obj.name, rest
+
+
+def _report_overlaps(works, all_works):
+    """Name the islands that lie on others now and did not before."""
+    names = [work.outcome.label for work in works]
+    now = [(work.uv / work.aspect)[work.triangles] for work in works]
+    before = [work.old_triangles for work in works]
+    before = [old if old is None else old / work.aspect for old, work in zip(before, works, strict=True)]
+    for obj, rest in _rests(all_works):
+        names.append(f"faces of {obj} that were not unwrapped")
+        now.append(rest)
+        before.append(rest)
+    for i, j in overlapping(now):
+        if before[i] is None or before[j] is None or not overlap(before[i], before[j]):
+            for one, other in ((i, j), (j, i)):
+                if one < len(works):
+                    works[one].outcome.overlaps += (names[other],)
+    for work in works:
+        if work.outcome.overlaps:
+            first, *more = work.outcome.overlaps
+            others = f" and {len(more)} more" if more else ""
+            work.outcome.warnings += (f"it lies on {first}{others} now: pack them together",)
 
 
 def _write(obj, works):
@@ -190,49 +276,13 @@ def _write(obj, works):
             work.outcome.error = str(error)
         return
     for work in works:
-        seen = work.uv * (-1, 1) if work.mirrored else work.uv
-        work.outcome.after = distortion(work.vertices, work.island.triangles, seen)
-        work.outcome.area = _area(work.vertices, work.island.triangles)
+        work.outcome.after = _as_stored(work)
+        work.outcome.area = placing.area(work.vertices, work.triangles)
 
 
-def _area(vertices, triangles):
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-
-
-def summary(outcomes):
-    """What happened in one line: "3 islands, stretch 1.310 → 1.090, no flips; 1 skipped: ..."."""
-    done = [outcome for outcome in outcomes if not outcome.error]
-    failed = [outcome for outcome in outcomes if outcome.error]
-    parts = []
-    if done:
-        stretch = _shown(_mean(done, [outcome.after.l2_stretch for outcome in done]))
-        if all(outcome.before for outcome in done):
-            before = _shown(_mean(done, [outcome.before.l2_stretch for outcome in done]))
-            stretch = f"{before} → {stretch}"
-        flips = sum(outcome.after.flips for outcome in done)
-        parts.append(f"{count(len(done), 'island')}, stretch {stretch}, {count(flips, 'flip')}")
-    if failed:
-        more = f" (and {len(failed) - 1} more)" if len(failed) > 1 else ""
-        first = f"{failed[0].label}: {failed[0].error}{more}"
-        parts.append(f"{len(failed)} skipped: {first}" if done else first)
-    return "; ".join(parts)
-
-
-def change(before, after, name):
-    """One measure of a `Distortion` before, if there was one, and after: "1.310 → 1.090"."""
-    new = _shown(getattr(after, name))
-    return f"{_shown(getattr(before, name))} → {new}" if before else new
-
-
-def count(number, noun):
-    return f"{number or 'no'} {noun}{'' if number == 1 else 's'}"
-
-
-def _shown(value):
-    return f"{value:.3f}" if value < 1e4 else f"{value:.1e}"
-
-
-def _mean(outcomes, values):
-    """Mean over the surface."""
-    return np.average(values, weights=[outcome.area for outcome in outcomes])
+def _as_stored(work):
+    """The distortion of the UVs that Blender stores: the core's, unless rounding turned faces where they lie now."""
+    seen = work.uv * (-1, 1) if work.mirrored else work.uv
+    if np.array_equal(orientation(seen, work.triangles), work.outcome.after.triangle_orientation):
+        return work.outcome.after
+    return distortion(work.vertices, work.triangles, seen)

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from .solver import Dirichlet
 from .surface import signed_areas
+from .validity import orientation
 from .weights import cotangent
 
 _RADIUS = 2.5  # of the fixed circle, by the island's
@@ -59,6 +60,8 @@ class Exterior:
         points, on_circle, triangles = air
         uv = np.vstack([uv[:n], points])
         self.surface = self._island.with_air(triangles, uv)
+        # Where the outline is all but straight, triangles may be inside out by rounding: they decide nothing.
+        self.surface.degenerate |= self.surface.air & (orientation(uv, self.surface.triangles) <= 0)
         self.dirichlet = Dirichlet(
             self.surface.order, self.surface.edges, np.concatenate([self._pinned, on_circle]), uv
         )

@@ -16,3 +16,15 @@ def _registered():
 @pytest.fixture(autouse=True)
 def _empty_scene():
     bpy.ops.wm.read_homefile(use_empty=True)
+
+
+@pytest.fixture
+def uv_editor():
+    """A context as in the UV Editor."""
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    old = area.ui_type
+    area.ui_type = 'UV'
+    region = next(region for region in area.regions if region.type == 'WINDOW')
+    yield {"window": window, "area": area, "region": region}
+    area.ui_type = old

@@ -5,6 +5,8 @@ import bpy  # isort: skip  (the wheel knows bmesh only after this)
 import bmesh
 import numpy as np
 
+FIVE = bpy.app.version >= (5, 0, 0)
+
 
 def add_grid(size=4, name="Grid", uv=True, location=(0, 0, 0)):
     """A bent grid of size x size quads with its default UVs; active and selected beside what is selected already."""
@@ -29,6 +31,19 @@ def add_cube(name="Cube"):
     return bpy.context.object
 
 
+def mesh_object(name, points, faces):
+    """A mesh of these points and faces as the only selected object."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points, [], faces)
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(obj)
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    return obj
+
+
 def edit_mode(select=None):
     """Enter Edit Mode in face mode; `select` (obj, face index) -> bool chooses the faces."""
     bpy.ops.object.mode_set(mode='EDIT')
@@ -37,8 +52,28 @@ def edit_mode(select=None):
     for obj in bpy.context.objects_in_mode:
         bm = bmesh.from_edit_mesh(obj.data)
         for face in bm.faces:
-            face.select_set(select is None or select(obj, face.index))
+            face.select_set(select is None or bool(select(obj, face.index)))
         bmesh.update_edit_mesh(obj.data)
+
+
+def select_uvs(obj, chosen, sticky=False):
+    """Select in the UV Editor the corners of these faces, and no others; `sticky` adds those at the same vertices."""
+    bm = bmesh.from_edit_mesh(obj.data)
+    layer = bm.loops.layers.uv.active
+    inside = {vertex for face in bm.faces if face.index in chosen for vertex in face.verts}
+    for face in bm.faces:
+        if FIVE:
+            face.uv_select = face.index in chosen
+        for loop in face.loops:
+            edge = face.index in chosen or (sticky and {loop.vert, loop.link_loop_next.vert} <= inside)
+            vert = face.index in chosen or (sticky and loop.vert in inside)
+            if FIVE:
+                loop.uv_select_vert, loop.uv_select_edge = vert, edge
+            else:
+                loop[layer].select, loop[layer].select_edge = vert, edge
+    if FIVE:
+        bm.uv_select_sync_valid = True
+    bmesh.update_edit_mesh(obj.data)
 
 
 def snapshot(obj):
@@ -53,12 +88,12 @@ def snapshot(obj):
         found["active"] = bm.faces.active and bm.faces.active.index
         found["history"] = [(type(element).__name__, element.index) for element in bm.select_history]
         found["shape layers"] = [
-            [tuple(vertex[layer]) for vertex in bm.verts] for layer in bm.verts.layers.shape.values()
+            np.array([vertex[layer] for vertex in bm.verts]).tobytes() for layer in bm.verts.layers.shape.values()
         ]
     else:
         found = _arrays(mesh)
         keys = mesh.shape_keys.key_blocks if mesh.shape_keys else ()
-        found["shape keys"] = [[tuple(point.co) for point in key.data] for key in keys]
+        found["shape keys"] = [np.array([point.co for point in key.data]).tobytes() for key in keys]
     layer = mesh.uv_layers.active
     return found | {"mode": obj.mode, "selected": obj.select_get(), "active UV map": layer and layer.name}
 

@@ -13,7 +13,7 @@ from scenes import add_cube, add_grid, uvs
 
 from qh_unwrap import __version__
 from qh_unwrap.addon import files
-from qh_unwrap.addon.options import Placement
+from qh_unwrap.addon.options import MeshOptions
 from qh_unwrap.cli import main
 from qh_unwrap.core import Settings
 
@@ -164,7 +164,7 @@ def test_failed_writing_leaves_the_old_file(tmp_path, monkeypatch):
 def test_every_setting_is_a_flag(capfd):
     assert main(["--help"]) == 0
     text = capfd.readouterr().out
-    for kind in (Settings, Placement):
+    for kind in (Settings, MeshOptions):
         for field in dataclasses.fields(kind):
             assert f"--{field.name.replace('_', '-')} " in text
             for choice in field.metadata["choices"]:
@@ -178,7 +178,7 @@ def test_json(tmp_path):
     )
     document = json.loads(numbers.read_text())
     expected = dataclasses.asdict(Settings(balance=0.5, repair=False, boundary="RECTANGLE"))
-    assert document["settings"] == expected | dataclasses.asdict(Placement())
+    assert document["settings"] == expected | dataclasses.asdict(MeshOptions())
     assert document["versions"] == {"qh_unwrap": __version__, "blender": bpy.app.version_string}
     islands = {island["object"]: island for island in document["islands"]}
     assert "seam" in islands["Box"]["error"]

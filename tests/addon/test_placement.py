@@ -2,10 +2,10 @@
 import bpy
 import numpy as np
 import pytest
-from scenes import add_grid, uvs
+from scenes import add_grid, edit_mode, uvs
 from scipy.spatial import Delaunay
 
-from qh_unwrap.addon import placing
+from qh_unwrap.addon import operators, placing
 
 
 def set_uvs(obj, values):
@@ -85,6 +85,104 @@ def test_unit_fills_the_square(boundary):
     for obj in (one, other):
         assert np.ptp(uvs(obj), axis=0).max() == pytest.approx(1)
         assert uvs(obj).min() >= 0 and uvs(obj).max() <= 1
+
+
+@pytest.mark.parametrize("method", ['SCALED', 'ADD'])
+def test_margin(method):
+    one, other = add_grid(2, "One"), add_grid(3, "Other", location=(3, 0, 0))
+    bpy.ops.uv.qh_unwrap(placement='PACK', margin=0.05, margin_method=method)
+    assert np.linalg.norm(uvs(one)[:, None] - uvs(other), axis=2).min() > 0.04
+
+
+def height_gradient(obj):
+    """Where in the layout the object's height grows."""
+    heights = np.array([obj.data.vertices[loop.vertex_index].co.z for loop in obj.data.loops])
+    uv = uvs(obj) - uvs(obj).mean(axis=0)
+    return np.linalg.lstsq(uv, heights - heights.mean(), rcond=None)[0]
+
+
+@pytest.mark.parametrize("rotation", [(0, 0, 0), (0.4, 1.2, 2.0)])
+@pytest.mark.parametrize("boundary", ['FREE', 'CIRCLE'])
+def test_first_unwrap_is_upright(boundary, rotation):
+    """A wall that leans, whose own up axis counts however the object is turned."""
+    obj = add_grid(6, uv=False)
+    for vertex in obj.data.vertices:
+        x, y, _ = vertex.co
+        vertex.co = (2 * x + 0.5 * y, 0.3 * y + 0.2 * x * x, y)
+    obj.rotation_euler = rotation
+    bpy.context.view_layer.update()
+    bpy.ops.uv.qh_unwrap(boundary=boundary)
+    across, up = height_gradient(obj)
+    assert up > 0 and abs(across) < 0.02 * up
+    assert area_and_centre(obj)[0] > 0, "and not mirrored"
+
+
+def test_first_unwrap_of_a_floor_lies_along_its_smallest_box():
+    obj = add_grid(6, uv=False)
+    turn = np.array([[np.cos(0.6), -np.sin(0.6)], [np.sin(0.6), np.cos(0.6)]])
+    for vertex in obj.data.vertices:
+        vertex.co = (*(turn @ (2.5 * vertex.co.x, vertex.co.y)), 0)
+    bpy.ops.uv.qh_unwrap()
+    width, height = np.ptp(uvs(obj), axis=0)
+    assert width / height == pytest.approx(2.5, rel=0.03)
+
+
+def test_mirrored_island_keeps_its_sign():
+    obj = add_grid(4)
+    set_uvs(obj, uvs(obj) * (-0.5, 0.5))
+    old_area, old_centre = area_and_centre(obj)
+    for options in ({}, {"placement": 'PACK'}, {"placement": 'UNIT'}, {"boundary": 'CIRCLE'}):
+        bpy.ops.uv.qh_unwrap(**options)
+        assert area_and_centre(obj)[0] < 0, options
+        assert operators.last_outcomes[0].after.flips == 0
+        if not options:
+            area, centre = area_and_centre(obj)
+            assert area == pytest.approx(old_area, rel=1e-4) and np.allclose(centre, old_centre, atol=0.02)
+
+
+def two_panels():
+    """A grid with a seam down the middle; the left half, faces 0 and 1 of four columns, is new."""
+    obj = add_grid(4)
+    for edge in obj.data.edges:
+        edge.use_seam = all(abs(obj.data.vertices[index].co.x) < 1e-6 for index in edge.vertices)
+    return obj
+
+
+def test_new_island_goes_beside_what_is_there():
+    obj = two_panels()
+    left = np.repeat([polygon.center.x < 0 for polygon in obj.data.polygons], 4)
+    values = uvs(obj)
+    values[left] = 0
+    set_uvs(obj, values)
+    edit_mode(lambda _, face: left[4 * face])
+    bpy.ops.uv.qh_unwrap()
+    assert np.array_equal(uvs(obj)[~left], values[~left])
+    new = uvs(obj)[left]
+    assert new[:, 0].min() >= 1 and new[:, 0].max() <= 2 and new[:, 1].min() >= 0 and new[:, 1].max() <= 1
+    assert not operators.last_outcomes[0].overlaps
+
+
+def test_overlap_with_another_island_is_reported_and_named():
+    obj = two_panels()
+    for options, expected in (({"boundary": 'CIRCLE'}, True), ({}, False), ({"placement": 'PACK'}, False)):
+        left = np.repeat([polygon.center.x < 0 for polygon in obj.data.polygons], 4)
+        apart = np.where(left, -0.1, 0.1)[:, None] * (1, 0)
+        set_uvs(obj, [(vertex.co.x / 2, vertex.co.y / 2) for vertex in corner_vertices(obj)] + apart)
+        bpy.ops.uv.qh_unwrap(**options)
+        one, other = operators.last_outcomes
+        assert (one.overlaps, other.overlaps) == (((other.label,), (one.label,)) if expected else ((), ())), options
+        assert any("pack them together" in text for text in one.warnings) == expected
+
+
+def test_stacked_islands_stay_stacked_without_a_warning():
+    obj = two_panels()
+    set_uvs(obj, [(abs(vertex.co.x) / 2, vertex.co.y / 2) for vertex in corner_vertices(obj)])
+    bpy.ops.uv.qh_unwrap(boundary='CIRCLE')
+    assert [outcome.overlaps for outcome in operators.last_outcomes] == [(), ()]
+
+
+def corner_vertices(obj):
+    return [obj.data.vertices[loop.vertex_index] for loop in obj.data.loops]
 
 
 def test_packing_in_edit_mode_leaves_others_alone():

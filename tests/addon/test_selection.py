@@ -4,40 +4,11 @@
 import bpy  # isort: skip
 import bmesh
 import pytest
-from scenes import add_grid, changes, edit_mode, snapshot
+from scenes import add_grid, changes, edit_mode, select_uvs, snapshot
 
 from qh_unwrap.addon import operators, selection
 
 _FIVE = bpy.app.version >= (5, 0, 0)
-
-
-@pytest.fixture
-def uv_editor():
-    """A context as in the UV Editor."""
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    old = area.ui_type
-    area.ui_type = 'UV'
-    region = next(region for region in area.regions if region.type == 'WINDOW')
-    yield {"window": window, "area": area, "region": region}
-    area.ui_type = old
-
-
-def select_uvs(obj, chosen):
-    """Select in the UV Editor the corners of these faces, and no others."""
-    bm = bmesh.from_edit_mesh(obj.data)
-    layer = bm.loops.layers.uv.active
-    for face in bm.faces:
-        if _FIVE:
-            face.uv_select = face.index in chosen
-        for loop in face.loops:
-            if _FIVE:
-                loop.uv_select_vert = loop.uv_select_edge = face.index in chosen
-            else:
-                loop[layer].select = loop[layer].select_edge = face.index in chosen
-    if _FIVE:
-        bm.uv_select_sync_valid = True
-    bmesh.update_edit_mesh(obj.data)
 
 
 def chosen_faces(context):
@@ -99,7 +70,7 @@ def test_unwrapping_keeps_the_uv_selection(uv_editor, sync):
     obj = add_grid(4)
     edit_mode(lambda _, face: face < 12)
     bpy.context.scene.tool_settings.use_uv_select_sync = sync
-    select_uvs(obj, {4, 5, 6, 7})
+    select_uvs(obj, {0, 1, 2, 4, 5, 6, 8, 9, 10})
     before = snapshot(obj)
     with bpy.context.temp_override(**uv_editor):
         expected = chosen_faces(bpy.context)
@@ -108,3 +79,17 @@ def test_unwrapping_keeps_the_uv_selection(uv_editor, sync):
     assert changes(before, snapshot(obj)) == {"UVMap"}
     assert [outcome.faces for outcome in operators.last_outcomes] == [len(faces) for faces in expected]
     assert bpy.context.scene.tool_settings.use_uv_select_sync == sync
+
+
+def test_packing_new_islands_keeps_the_uv_selection(uv_editor):
+    obj = add_grid(4)
+    for edge in obj.data.edges:
+        edge.use_seam = True
+    edit_mode()
+    bpy.ops.mesh.select_mode(type='VERT')
+    bpy.context.scene.tool_settings.use_uv_select_sync = False
+    select_uvs(obj, {0, 5, 7}, sticky=False)
+    before = snapshot(obj)
+    assert bpy.ops.uv.qh_unwrap(placement='PACK') == {'FINISHED'}
+    assert changes(before, snapshot(obj)) == {"UVMap"}
+    assert not bpy.context.scene.tool_settings.use_uv_select_sync

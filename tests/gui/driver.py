@@ -90,7 +90,7 @@ def steps(gui):
     gui.shot("12_reports.png")
 
 
-_BUTTONS = {"Unwrap": 43, "Mesh": 240, "Advanced": 265}  # pixels below the top of the sidebar
+_BUTTONS = {"Unwrap": 43, "Mesh": 264, "Advanced": 288}  # pixels below the top of the sidebar
 
 
 def _add(gui, add, is_seam):
