@@ -15,6 +15,7 @@ from .tensor import area_scale, edge_matrix
 from .validity import invalid
 
 _AIR = 0.1  # the air's part of the energy
+_FLAT = 1e-2  # of its made-up area counts a triangle that has none, so that it cannot flip either
 _SMALLEST = 1e-9  # eigenvalue of the Hessian's triangles
 _LONGEST = 0.9  # of the step at which a triangle collapses
 _ARMIJO = 1e-4
@@ -63,14 +64,15 @@ class _Energy:
         self.triangles = surface.triangles
         self._powers = exponents(balance)
         rest = surface.shapes_in(uv)
-        weight = np.where(surface.air | surface.degenerate, 0, surface.area)
+        weight = np.where(surface.air, 0, np.where(surface.degenerate, _FLAT, 1) * surface.area)
         self.weight = weight / weight.sum()
         (a, b), (c, d) = edge_matrix(rest) * np.where(surface.air, 1.0, scale)
         det = a * d - b * c
         inverse = np.array([[d, -b], [-c, a]]) / np.where(det == 0, 1.0, det)
         self._hats = np.stack([-inverse.sum(axis=0), *inverse])  # gradients of the corners' hat functions, (3, 2, m)
         if surface.air.any():
-            self.weight[surface.air] = _AIR * self.value(uv) / surface.air.sum()
+            air = surface.air & ~surface.degenerate
+            self.weight[air] = _AIR * self.value(uv) / air.sum()
         self._counts = self.weight > 0
 
     def jacobian(self, uv):

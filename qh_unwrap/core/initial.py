@@ -37,7 +37,7 @@ def fit(points, chosen, targets, mirror=False):
 def _fit(z, chosen, target):
     centred, wanted = z - z[chosen].mean(), target[chosen] - target[chosen].mean()
     size = np.vdot(centred[chosen], centred[chosen]).real
-    turn = np.vdot(centred[chosen], wanted) / size if size > 0 else 1.0
+    turn = (np.vdot(centred[chosen], wanted) / size if size > 0 else 0) or 1.0
     fitted = turn * centred + target[chosen].mean()
     return np.linalg.norm(fitted[chosen] - target[chosen]), fitted
 

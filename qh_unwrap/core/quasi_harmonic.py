@@ -25,6 +25,8 @@ class State:
     """The largest movement of a vertex by the layout's diameter; infinite for the initial map."""
     valid: bool
     """No triangle is flipped or collapsed in 32-bit floats."""
+    converged: bool
+    """No vertex moved by more than the tolerance, and none was held back."""
     repaired: bool
     """Weights had to be changed, in this iteration or an earlier one, to turn flipped triangles back."""
 
@@ -58,7 +60,7 @@ def iterate(domain, settings, uv, n):
     repair = Repair(remember=settings.balance > _REMEMBER_ABOVE)
     repairing = settings.repair and settings.weights == "COTANGENT"
     change = np.inf
-    yield State(0, uv, change, not invalid(domain.surface, uv).any(), False)
+    yield State(0, uv, change, not invalid(domain.surface, uv).any(), False, False)
     for iteration in range(1, settings.iterations + 1):
         if change <= settings.tolerance:
             return
@@ -66,7 +68,8 @@ def iterate(domain, settings, uv, n):
         weights = next_weights(domain, uv)
         uv = repair.solve(domain, weights, uv) if repairing else domain.dirichlet.solve(weights)
         change = float(np.linalg.norm((uv - previous)[:n], axis=1).max() / diameter(uv[:n]))
-        yield State(iteration, uv, change, not invalid(domain.surface, uv).any(), repair.active)
+        converged = change <= settings.tolerance and not repair.shortened
+        yield State(iteration, uv, change, not invalid(domain.surface, uv).any(), converged, repair.active)
 
 
 def check_settings(settings):

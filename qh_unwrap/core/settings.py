@@ -85,12 +85,12 @@ class Settings:
     weights: str = setting("COTANGENT", "Weights", "How the improvement is computed", choices=_WEIGHTS)
     initial: str = setting("AUTO", "Start", "The map that is improved", choices=_INITIAL)
     refine: int = setting(
-        10,
+        30,
         "Refine",
         "At most this many steps from there to the least distortion (cotangent weights); 0 keeps the quasi-harmonic"
         " map itself",
         range=(0, 1000),
-        soft_range=(0, 30),
+        soft_range=(0, 100),
     )
     repair: bool = setting(True, "Repair Flips", "Turn flipped faces over (cotangent weights)")
     fill_holes: bool = setting(

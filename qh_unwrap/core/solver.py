@@ -3,10 +3,11 @@
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array
-from scipy.sparse.csgraph import maximum_bipartite_matching
+from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 _LEAF = 4
+_FEW = 300  # vertices whose order hardly matters
 
 
 class System:
@@ -108,6 +109,9 @@ def nested_dissection(points, edges):
     smallest set of vertices that meets every cut edge (Koenig's theorem) separates the halves and is ordered last.
     """
     n, axes = points.shape
+    if len(edges) and n <= _FEW:
+        graph = coo_array((np.ones(len(edges), np.int8), tuple(edges.T)), shape=(n, n))
+        return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
     piece = np.zeros(n, dtype=np.int64)  # -1 once in a separator
     key = np.zeros(n, dtype=np.int64)  # one base-3 digit a level: first half 0, second half 1, separator 2
     orders = [np.argsort(points[:, axis], kind="stable") for axis in range(axes)]

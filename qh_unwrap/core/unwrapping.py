@@ -15,9 +15,10 @@ from .quasi_harmonic import Held, check_settings, diameter, energy, iterate
 from .settings import Settings
 from .solver import Dirichlet
 from .surface import Surface
-from .validity import enclosed_area, is_injective
+from .validity import enclosed_area, invalid, is_injective
 
 _HANDOVER = 0.3  # an iteration that lowers the energy by less than this part of it gives way to the refinement
+_ISOMETRIC = 1 + 1e-9  # the energy of a map that nothing can better
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +102,7 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
     mirrored = in_frame and enclosed_area(uv[outer_loop(surface, uv)]) < 0
     mirror = np.array([-1.0, 1.0]) if mirrored else np.ones(2)
     given = None if uv is None else uv * mirror
+    placed = _in_unit_square if settings.boundary == "FREE" and not in_frame else np.asarray
 
     if settings.boundary == "FREE":
         domain, start, warnings = _free(surface, settings, given, pinned, triangulate)
@@ -115,7 +117,7 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
             yield replace(state, uv=state.uv[:n] * mirror)
         # Repairs and new air make the energy rise and fall: keep the best valid map from then on.
         uneven = state.repaired or refining or settings.boundary == "FREE"
-        if state.valid:
+        if state.valid and not invalid(surface, placed(state.uv[:n])).any():
             value = energy(surface, state.uv[:n], settings.balance) if uneven else np.inf
             gain = least - value
             if best is None or not uneven or value < least:
@@ -125,17 +127,17 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
     last = state
     if best is not None and uneven:
         state = best
-    converged = bool(changes) and changes[-1] <= settings.tolerance
+    converged = last.converged
     if refining and state.valid:
         refined = state.uv if state is last else domain.recalled(state.uv, n)
         steps = () if refined is None else descend(domain, settings.balance, settings.refine, refined)
         for refined, done in steps:
+            if invalid(surface, placed(refined[:n])).any():
+                break
             changes.append(float(np.linalg.norm(refined[:n] - state.uv[:n], axis=1).max() / diameter(refined[:n])))
             state, converged = replace(state, iteration=len(changes), uv=refined, change=changes[-1]), done
             yield replace(state, uv=refined[:n] * mirror)
-    chosen = state.uv[:n]
-    if settings.boundary == "FREE" and not in_frame:
-        chosen = (chosen - chosen.min(axis=0)) / np.ptp(chosen, axis=0).max()
+    chosen = placed(state.uv[:n])
 
     if surface.degenerate.any():
         warnings += (f"{surface.degenerate.sum()} faces have zero area",)
@@ -151,6 +153,10 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
         warnings=warnings,
     )
     return Result(chosen * mirror, report)
+
+
+def _in_unit_square(uv):
+    return (uv - uv.min(axis=0)) / np.ptp(uv, axis=0).max()
 
 
 def _checked_pins(surface, pinned):
@@ -233,6 +239,8 @@ def _best_start(surface, settings):
         value = energy(surface, start, settings.balance)
         if value < least and is_injective(start, surface.triangles, surface.loops):
             best, least = start, value
+        if least < _ISOMETRIC:
+            break
     return start if best is None else best
 
 

@@ -8,6 +8,7 @@ import numpy as np
 _FLOOR = 0.1
 _ROUNDS = 8
 _HALVINGS = 10
+_PORTION = 1_000_000  # pairs at a time
 
 
 def turn(a, b, c):
@@ -65,20 +66,9 @@ def count_crossings(polygons, touching=False):
     number = np.arange(len(start))
     following = np.where(number == last_side, first_side, number + 1)
 
-    axis = int(np.argmax(np.ptp(start, axis=0)))
     low, high = np.minimum(start, end), np.maximum(start, end)
-    order = np.argsort(low[:, axis], kind="stable")
     crossings = 0
-    # Sides sorted by where they begin: compare each with its followers as long as those begin before it ends.
-    place = np.arange(len(order))
-    for ahead in range(1, len(order)):
-        place = place[place + ahead < len(order)]
-        place = place[low[order[place + ahead], axis] <= high[order[place], axis]]
-        if not len(place):
-            break
-        one, other = order[place], order[place + ahead]
-        near = (low[one] <= high[other]).all(axis=1) & (low[other] <= high[one]).all(axis=1)
-        one, other = one[near], other[near]
+    for one, other in _near_sides(low, high):
         a, b, c, d = start[one], end[one], start[other], end[other]
         across, back = turn(a, b, c) * turn(a, b, d), turn(c, d, a) * turn(c, d, b)
         if not touching:
@@ -93,6 +83,21 @@ def count_crossings(polygons, touching=False):
     return crossings
 
 
+def _near_sides(low, high):
+    """The pairs of sides with the boxes from `low` to `high` (n, 2) that meet, a portion at a time."""
+    axis = int(np.argmax(np.ptp(low, axis=0)))
+    order = np.argsort(low[:, axis], kind="stable")
+    # Sides sorted by where they begin: each is near its followers as long as those begin before it ends.
+    count = np.searchsorted(low[order, axis], high[order, axis], side="right") - np.arange(len(order)) - 1
+    for part in np.array_split(np.arange(len(order)), 1 + count.sum() // _PORTION):
+        total = np.cumsum(count[part])
+        one = np.repeat(part, count[part])
+        other = one + 1 + np.arange(len(one)) - np.repeat(total - count[part], count[part])
+        one, other = order[one], order[other]
+        near = (low[one] <= high[other]).all(axis=1) & (low[other] <= high[one]).all(axis=1)
+        yield one[near], other[near]
+
+
 def invalid(surface, uv):
     """The triangles that are not positive though they could be, air included, (m,) bool."""
     return (orientation(uv, surface.triangles) <= 0) & ~surface.degenerate
@@ -101,12 +106,14 @@ def invalid(surface, uv):
 class Repair:
     """Turns flipped triangles back by flooring the weights around them.
 
-    With `remember`, floored weights stay so in later solves; `active` tells whether any had to be floored.
+    With `remember`, floored weights stay so in later solves; `active` tells whether any had to be floored, `shortened`
+    whether the last solve went only part of the way.
     """
 
     def __init__(self, remember):
         self.remember = remember
         self.active = False
+        self.shortened = False
         self._marked = np.zeros(0, bool)
 
     def solve(self, domain, weights, previous):
@@ -115,6 +122,7 @@ class Repair:
         If that does not help, or only air flips, go part of the way from the `previous` map, where that one is valid.
         """
         surface, dirichlet = domain.surface, domain.dirichlet
+        self.shortened = False
         marked = np.zeros(len(surface.vertices), bool)
         if self.remember:
             kept = self._marked[: len(marked)]  # air, the last, may have changed
@@ -133,6 +141,7 @@ class Repair:
                 marked[surface.edges[marked[surface.edges].any(axis=1)]] = True
         self._marked = marked
         if not invalid(surface, previous).any():
+            self.shortened = True
             for halving in range(1, _HALVINGS + 1):
                 shorter = previous + (uv - previous) / 2**halving
                 if not invalid(surface, shorter).any():

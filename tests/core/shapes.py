@@ -89,6 +89,52 @@ def torus(around=9, across=7, open=False):
     return vertices, triangles[1:] if open else triangles
 
 
+def strip(length, segments, bend=0.0):
+    """A developable ribbon of width 1, rolled by `bend` radians in all."""
+    vertices, triangles = grid(segments, max(2, segments // int(length)), width=length)
+    x, y, _ = vertices.T
+    if bend:
+        radius = length / bend
+        vertices = np.column_stack([radius * np.sin(x / radius), y, radius * np.cos(x / radius)])
+    return vertices, triangles
+
+
+def cut(vertices, triangles, keep):
+    """The triangles whose centres `keep` accepts, and their vertices."""
+    triangles = triangles[keep(*vertices[triangles].mean(axis=1).T)]
+    used, triangles = np.unique(triangles, return_inverse=True)
+    return vertices[used], triangles.reshape(-1, 3)
+
+
+DEVELOPABLE = ("strip 4:1", "strip 40:1", "L", "spiral", "cone", "cylinder")
+
+
+def developable(name):
+    """A surface that can be flattened without distortion: one of `DEVELOPABLE`."""
+    if name == "strip 4:1":
+        return strip(4, 32, bend=2)
+    if name == "strip 40:1":
+        return strip(40, 160, bend=5)
+    if name == "L":
+        vertices, triangles = cut(*grid(24, 24), lambda x, y, z: (x < 0.3) | (y < 0.3))
+        x, y, _ = vertices.T
+        return np.column_stack([np.sin(2 * x) / 2, y, np.cos(2 * x) / 2]), triangles
+    if name == "spiral":
+        angle, across = np.meshgrid(np.linspace(0, 5 * np.pi, 200), np.linspace(0, 1, 5))
+        radius = 1 + 0.25 * angle / np.pi + 0.35 * across
+        _, triangles = grid(199, 4)
+        return np.column_stack(
+            [(radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel(), 0 * angle.ravel()]
+        ), (triangles[:, ::-1])
+    if name == "cone":
+        vertices, triangles = cut(*grid(30, 10, width=1.8 * np.pi), lambda x, y, z: y > 0.1)
+        x, y, _ = vertices.T
+        return np.column_stack([y * np.cos(x), y * np.sin(x), y]), triangles[:, ::-1]
+    vertices, triangles = grid(40, 8, width=2 * np.pi, height=2)  # a cylinder cut open
+    x, y, _ = vertices.T
+    return np.column_stack([np.sin(x), y, np.cos(x)]), triangles
+
+
 def tetrahedron():
     """The smallest closed surface."""
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])

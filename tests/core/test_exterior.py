@@ -3,13 +3,14 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core import Settings, Surface, distortion, errors, unwrap
-from qh_unwrap.core.exterior import Exterior, make_air
+from qh_unwrap.core.exterior import Exterior, _within, make_air
 from qh_unwrap.core.surface import signed_areas
 from qh_unwrap.core.tensor import surface_tensor
 from qh_unwrap.core.validity import is_injective
 
 from . import shapes
 from .blender import triangulate
+from .patches import Patches
 
 FREE = Settings(boundary="FREE")
 
@@ -101,6 +102,38 @@ def test_pins_stay_and_the_rest_follows():
         np.testing.assert_array_equal(result.uv[pinned], (uv * mirror)[pinned])
         assert result.report.mirrored == (mirror[0] < 0)
         assert result.report.injective and result.report.after.symmetric_dirichlet < 1.4
+
+
+def test_air_is_made_around_sides_that_lie_all_but_on_a_line():
+    # Spread on a circle its 803 sides are straight in 32-bit floats, and triangles between them are inside out.
+    kind, vertices, triangles = Patches()(124)
+    assert (kind, len(triangles)) == ("fan", 803)
+    report = free(vertices, triangles, iterations=1).report
+    assert report.injective and not report.warnings
+
+
+def test_points_lie_within_or_without():
+    random = np.random.default_rng(0)
+    for polygon, points in ((random.random((40, 2)), random.random((900, 2))), np.mgrid[:2, :6, :6].reshape(2, -1, 2)):
+        start, end = polygon, np.roll(polygon, -1, axis=0)
+        (x, y), (px, py) = points.T[:, :, None], (start.T, end.T)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at = px[0] + (py[0] - px[0]) * (y - px[1]) / (py[1] - px[1])
+        crossed = ((px[1] > y) != (py[1] > y)) & (x < at)
+        np.testing.assert_array_equal(_within(points, start, end), crossed.sum(axis=1) % 2 == 1)
+
+
+def test_an_outline_that_pins_cross_is_kept_and_not_certified():
+    vertices, triangles = shapes.bump(4)
+    loop = Surface(vertices, triangles).loops[0]
+    uv = vertices[:, :2].copy()
+    pinned = np.zeros(len(uv), bool)
+    pinned[loop] = True
+    uv[loop] = np.random.default_rng(1).permutation(uv[loop])
+    result = free(vertices, triangles, uv, pinned)
+    np.testing.assert_array_equal(result.uv[pinned], uv[pinned])
+    assert not result.report.injective and result.report.after.flips > 0
+    assert any("pins" in warning for warning in result.report.warnings)
 
 
 def test_crossing_pins_are_never_certified():
