@@ -17,6 +17,7 @@ BENCHMARKS = (
     "projection_start",
     "mesh_density",
     "tensor_powers",
+    "free_boundary",
 )
 
 
