@@ -15,12 +15,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from scipy.spatial import Delaunay
 
 import qh_unwrap
 from qh_unwrap.core import distortion
 
 from .common import find_mesh, load_mesh, table
+from .generated import hills
 
 NATIVE = {
     "Angle Based": {"method": "ANGLE_BASED"},
@@ -89,34 +89,6 @@ def timed(mesh, method):
     uv = np.zeros((len(vertices), 2))
     uv[owner] = corners.reshape(-1, 2)
     return seconds, uv
-
-
-def hills(triangles, seed=1):
-    """A round patch of gentle and steep hills with about so many irregular triangles."""
-    rng = np.random.default_rng(seed)
-    rim = max(12, int(1.3 * np.sqrt(triangles)))
-    inner = (triangles - rim) // 2
-    step = np.sqrt(np.pi / inner)
-    x, y = np.meshgrid(np.arange(-1, 1, step), np.arange(-1, 1, step))
-    plane = np.column_stack([x.ravel(), y.ravel()]) + 0.35 * step * rng.uniform(-1, 1, (x.size, 2))
-    plane = plane[np.linalg.norm(plane, axis=1) < 1 - 0.6 * step]
-    angle = 2 * np.pi * np.arange(rim) / rim
-    plane = np.vstack([plane, np.column_stack([np.cos(angle), np.sin(angle)])])
-    plane = plane[rng.permutation(len(plane))]
-    faces = Delaunay(plane).simplices
-    a, b, c = plane[faces].transpose(1, 0, 2)
-    clockwise = (b - a)[:, 0] * (c - a)[:, 1] < (b - a)[:, 1] * (c - a)[:, 0]
-    faces[clockwise] = faces[clockwise][:, ::-1]
-    x, y = plane.T
-    height = np.zeros(len(plane))
-    for u, v, tall, width in (
-        (0.35, 0.2, 0.9, 0.3),
-        (-0.4, 0.3, 0.7, 0.2),
-        (-0.1, -0.45, -0.6, 0.25),
-        (0.5, -0.5, 0.3, 0.1),
-    ):
-        height += tall * np.exp(-((x - u) ** 2 + (y - v) ** 2) / (2 * width**2))
-    return np.column_stack([x, y, height]), faces
 
 
 if __name__ == "__main__":
