@@ -1,94 +1,316 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Time and distortion beside Blender's own methods, on the same meshes, in one process.
 
-Each mesh is in Edit Mode with all of its faces selected and without UVs; timed is the call of the operator, with its
-reading, packing and writing, and ours includes its check for flips.  Distortion is measured on the UVs that Blender
-stores.  Needs bpy; meshes of QH_MESHES are added to the generated ones.
+Default settings, Edit Mode to Edit Mode; distortion is measured on the UVs that Blender stores.  Needs bpy; the meshes
+of QH_MESHES are added to the generated ones.  Figures are also written to the folder `--out` as JSON.
 
-    python -m tests.benchmarks.against_blender [--sizes 2000,10000] [--minutes 30]
+    python -m tests.benchmarks.against_blender [--part quality|time|growth|islands|slider|scans|all] [--largest 30000]
+
+Of the parts, `quality` takes some fifteen minutes and `time` half an hour, nearly all of it Minimum Stretch at 200 000
+triangles.
 """
 
 import argparse
-import resource
-import time
+import json
 from pathlib import Path
+from statistics import median
+from unittest.mock import patch
 
 import bpy
 import numpy as np
+import scipy
 
-import qh_unwrap
-from qh_unwrap.core import distortion
+from qh_unwrap.addon.delaunay import triangulate
+from qh_unwrap.core import Settings, Surface, descent, unwrap
+from qh_unwrap.core.distortion import measure
+from qh_unwrap.core.validity import is_injective
 
-from .common import find_mesh, load_mesh, table
-from .generated import hills
+from .common import Verdicts, find_mesh, load_mesh, meshes_in, table
+from .drawing import BLUE, GREEN, GREY, RED, plain_ticks, plt, save
+from .generated import body, hills, hundred, islands
+from .in_blender import ANGLE_BASED, CONFORMAL, NATIVE, OURS, STRETCH_10, STRETCH_50, extension, unwrapped
+from .one_unwrap import alone
 
-NATIVE = {
-    "Angle Based": {"method": "ANGLE_BASED"},
-    "Conformal": {"method": "CONFORMAL"},
-    "Minimum Stretch 10": {"method": "MINIMUM_STRETCH", "iterations": 10},
-    "Minimum Stretch 50": {"method": "MINIMUM_STRETCH", "iterations": 50},
-}
-OURS = "QH Unwrap"
 SCANS = ("venus.obj", "camel_b.obj", "camelhead.off", "mannequin-devil.off", "cowhead.obj", "face_bff.obj")
+SIZES = (2000, 10_000, 30_000, 100_000, 200_000)
+FASTER = {  # at least so many times as fast, by triangles
+    STRETCH_10: {2000: 1, 10_000: 3, 30_000: 6, 100_000: 15, 200_000: 30},
+    CONFORMAL: {30_000: 1, 200_000: 3},
+}
+ALONE = (10_000, 30_000, 100_000, 200_000, 500_000, 1_000_000)
+MODEL = 90_000
+BALANCES = (0.0, 0.25, 0.5, 1.0)
+SLID = ("face_bff.obj", "camelhead.off", "cowhead.obj", "mannequin-devil.off", "lilium.obj")
+COLOURS = {OURS: BLUE, STRETCH_10: RED, CONFORMAL: GREEN, ANGLE_BASED: GREY}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sizes", default="2000,10000,30000,100000", help="triangles of the generated meshes")
-    parser.add_argument("--minutes", type=float, default=20, help="start no slower method once so much time has gone")
+    parser.add_argument("--part", choices=[*PARTS, "all"], default="all", help="what to measure (default: all)")
+    parser.add_argument("--largest", type=int, default=10**9, help="leave out meshes of more triangles")
+    parser.add_argument("--seconds", type=float, default=20, help="to time each method on a mesh (default: 20)")
+    parser.add_argument("--pieces", type=int, default=5000, help="islands of 20 triangles (default: 5000)")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for figures (default: out)")
     arguments = parser.parse_args()
-    meshes = {f"hills {int(size):,}": hills(int(size)) for size in arguments.sizes.split(",")}
-    for name in SCANS:
-        if path := find_mesh(name):
-            meshes[Path(name).stem] = load_mesh(path)
-    qh_unwrap.register()
-    try:
-        begun = time.time()
-        for name, mesh in meshes.items():
-            rows = []
-            for method in (OURS, *NATIVE):
-                if method == "Minimum Stretch 50" and time.time() - begun > 60 * arguments.minutes:
-                    continue
-                seconds, uv = timed(mesh, method)
-                rows.append((method, seconds, distortion(*mesh, uv)))
-            ours = rows[0][1]
-            print(f"{name}: {len(mesh[1]):,} triangles")
-            table(
-                ("method", "seconds", "times ours", "L2 stretch", "sym. Dirichlet", "flips"),
-                [(method, t, t / ours, d.l2_stretch, d.symmetric_dirichlet, d.flips) for method, t, d in rows],
-            )
-    finally:
-        qh_unwrap.unregister()
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    print(f"Blender {bpy.app.version_string}, NumPy {np.__version__}; peak memory {peak:.2f} GiB")
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    versions = {"Blender": bpy.app.version_string, "NumPy": np.__version__, "SciPy": scipy.__version__}
+    print(", ".join(f"{name} {version}" for name, version in versions.items()))
+    verdicts = Verdicts()
+    with extension():
+        for method in (OURS, *NATIVE):
+            unwrapped(hills(500), method)  # what happens only once does not count
+        for part in PARTS if arguments.part == "all" else [arguments.part]:
+            print(f"\n== {part}\n", flush=True)
+            figures = PARTS[part](arguments, verdicts)
+            path = arguments.out / f"against_blender_{part}.json"
+            path.write_text(json.dumps({"versions": versions, part: figures}, indent=1, default=float) + "\n")
+    verdicts.exit()
 
 
-def timed(mesh, method):
-    """Seconds that the method takes on the mesh, and the UVs of the vertices (n, 2)."""
-    vertices, triangles = mesh
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    data = bpy.data.meshes.new("mesh")
-    data.from_pydata(vertices.tolist(), [], triangles.tolist())
-    obj = bpy.data.objects.new("mesh", data)
-    bpy.context.collection.objects.link(obj)
-    bpy.context.view_layer.objects.active = obj
-    obj.select_set(True)
-    bpy.ops.object.mode_set(mode='EDIT')
-    bpy.ops.mesh.select_all(action='SELECT')
-    begun = time.perf_counter()
-    if method == OURS:
-        bpy.ops.uv.qh_unwrap()
-    else:
-        bpy.ops.uv.unwrap(**NATIVE[method], fill_holes=True, correct_aspect=False, margin=0)
-    seconds = time.perf_counter() - begun
-    bpy.ops.object.mode_set(mode='OBJECT')
-    corners = np.empty(2 * len(data.loops), np.float32)
-    data.uv_layers.active.uv.foreach_get("vector", corners)
-    owner = np.empty(len(data.loops), np.int32)
-    data.loops.foreach_get("vertex_index", owner)
-    uv = np.zeros((len(vertices), 2))
-    uv[owner] = corners.reshape(-1, 2)
-    return seconds, uv
+def quality(arguments, verdicts):
+    """Where ours ends beside Minimum Stretch, and how far from the end of its own descent."""
+    meshes = {**meshes_in("disk"), **hundred()}
+    meshes = {name: mesh for name, mesh in meshes.items() if len(mesh[1]) <= arguments.largest}
+    print("Symmetric Dirichlet energy of ours, Minimum Stretch 10 and 50, and ours converged; time of ours\n")
+    found = []
+    for name, mesh in meshes.items():
+        surface = Surface(*mesh)
+        row = {"mesh": name, "triangles": len(mesh[1])}
+        for method in (OURS, STRETCH_10, STRETCH_50):
+            row[method] = judged(surface, *unwrapped(mesh, method))
+        row["converged"] = converged(mesh)
+        found.append(row)
+        energies = (row[method]["energy"] for method in (OURS, STRETCH_10, STRETCH_50))
+        texts = [f"{energy:.5f}" for energy in (*energies, row["converged"])]
+        print(f"{name:<24}{len(mesh[1]):>7}  {'  '.join(texts)}  {row[OURS]['seconds']:.2f} s", flush=True)
+    print()
+    ours, shortest, longest = (
+        np.array([row[method]["energy"] for row in found]) for method in (OURS, STRETCH_10, STRETCH_50)
+    )
+    end = np.array([row["converged"] for row in found])
+    names = np.array([row["mesh"] for row in found])
+
+    def share(text, holds, least):
+        figures = f"{holds.sum()} of {len(holds)}, {holds.mean():.1%}"
+        if not holds.all():
+            figures += f"; not {', '.join(names[~holds])}"
+        verdicts.claim(f"{text} on {least:.0%}", holds.mean() >= least, figures)
+
+    share("no more distortion than Minimum Stretch 10", ours <= shortest, 0.98)
+    share("within 0.5 % of Minimum Stretch 50, or better", ours <= 1.005 * longest, 0.95)
+    share("within 1 % of its own converged energy", ours <= 1.01 * end, 0.9)
+    for method, energies in ((STRETCH_10, shortest), (STRETCH_50, longest)):
+        above = ours > 1.01 * energies
+        worst = ", ".join(f"{names[k]} {ours[k] / energies[k] - 1:+.1%}" for k in np.flatnonzero(above))
+        verdicts.claim(f"more than 1 % above {method} on at most two", above.sum() <= 2, worst or "none")
+    flips = sum(row[OURS]["flips"] for row in found)
+    verdicts.claim("no flips", flips == 0, f"{flips}")
+    certified = np.array([row[OURS]["certified"] for row in found])
+    share("certified free of flips and overlaps", certified, 1)
+    for method in (STRETCH_10, STRETCH_50):
+        count = sum(row[method]["certified"] for row in found)
+        print(f"{method}: {count} of {len(found)} would be certified")
+
+    figure, axis = plt.subplots(figsize=(6, 3.4))
+    others = (STRETCH_10, shortest, RED), (STRETCH_50, longest, GREEN), ("converged", end, GREY)
+    for method, energies, colour in others:
+        axis.plot(np.sort(100 * (ours / energies - 1)), ".", color=colour, label=f"above {method}")
+    axis.set_yscale("symlog", linthresh=0.1)
+    axis.set(xlabel="meshes", ylabel="energy of ours, %")
+    axis.legend()
+    save(figure, arguments.out, "against_blender_quality.png")
+    return found
+
+
+def time(arguments, verdicts):
+    """Generated hills, methods in turns."""
+    found = []
+    for size in sizes_up_to(arguments.largest, SIZES):
+        mesh = hills(size)
+        methods = compared(f"hills {size:,}", mesh, (OURS, STRETCH_10, CONFORMAL, ANGLE_BASED), arguments.seconds)
+        found.append({"size": size, "triangles": len(mesh[1]), **methods})
+    for method, targets in FASTER.items():
+        for row in found:
+            if row["size"] in targets:
+                least = targets[row["size"]]
+                times = row[method]["seconds"] / row[OURS]["seconds"]
+                text = f"{row['triangles']:,} triangles: at least {least} times as fast as {method}"
+                seconds = f"{row[OURS]['seconds']:.2f} s, {row[method]['seconds']:.2f} s"
+                verdicts.claim(text, times >= least, f"{times:.2f} times, {seconds}")
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4))
+    for method, colour in COLOURS.items():
+        triangles = [row["triangles"] for row in found]
+        left.loglog(triangles, [row[method]["seconds"] for row in found], "o-", color=colour, label=method)
+        right.loglog(triangles, [row[method]["energy"] for row in found], "o-", color=colour)
+    left.set(xlabel="triangles", ylabel="seconds")
+    right.set(xlabel="triangles", ylabel="symmetric Dirichlet energy")
+    for axis in (left, right):
+        plain_ticks(axis.xaxis, SIZES)
+    plain_ticks(left.yaxis, [0.01, 0.1, 1, 10, 100, 1000])
+    plain_ticks(right.yaxis, [1, 1.1, 1.2, 1.3, 1.4])
+    left.legend()
+    save(figure, arguments.out, "against_blender_time.png")
+    return found
+
+
+def growth(arguments, verdicts):
+    """Ours alone, each mesh in a process of its own."""
+    sizes = sizes_up_to(arguments.largest, ALONE)
+    meshes = {size: hills(size) for size in sizes}
+    if arguments.largest >= MODEL:
+        meshes["body"] = body(np.random.default_rng(1), MODEL)
+    found, rows = [], []
+    for name, mesh in meshes.items():
+        run = alone(mesh, 3 if len(mesh[1]) <= 200_000 else 1)
+        run["seconds"] = median(run["seconds"])
+        found.append({"mesh": name, "triangles": len(mesh[1]), **run})
+        shown = name if name == "body" else "hills"
+        rows.append((shown, f"{len(mesh[1]):,}", run["seconds"], run["peak"] / 1e9, run["energy"], run["flips"]))
+    table(("mesh", "triangles", "seconds", "peak GB", "sym. Dirichlet", "flips"), rows)
+    by_name = {row["mesh"]: row for row in found}
+    if "body" in by_name:
+        print(f"A model of {by_name['body']['triangles']:,} triangles takes {by_name['body']['seconds']:.1f} s")
+    if sizes and sizes[-1] == ALONE[-1]:
+        large, small = by_name[1_000_000], by_name[100_000]
+        times = large["seconds"] / small["seconds"]
+        text = "1 M triangles: at most 14 times the time of 100 k"
+        verdicts.claim(text, times <= 14, f"{times:.1f} times, {large['seconds']:.1f} s, {small['seconds']:.2f} s")
+        verdicts.claim("1 M triangles: peak below 4 GB", large["peak"] < 4e9, f"{large['peak'] / 1e9:.2f} GB")
+    return found
+
+
+def islands_of_20(arguments, verdicts):
+    """Thousands of pieces in one mesh."""
+    vertices, triangles, piece = islands(arguments.pieces)
+    ends = np.flatnonzero(np.diff(piece)) + 1
+    surfaces = []
+    for part in np.split(triangles, ends):
+        corner, corners = np.unique(part, return_inverse=True)
+        surfaces.append((corner, Surface(vertices[corner], corners.reshape(-1, 3))))
+    found = {"islands": len(surfaces), "triangles": len(triangles)}
+    rows = []
+    for method, runs in in_turns((vertices, triangles), (OURS, STRETCH_10), arguments.seconds).items():
+        seconds = median(seconds for seconds, _ in runs)
+        maps = [judged(surface, seconds, runs[-1][1][corner]) for corner, surface in surfaces]
+        found[method] = {
+            "seconds": seconds,
+            "energy": float(np.mean([one["energy"] for one in maps])),
+            "flips": sum(one["flips"] for one in maps),
+            "certified": sum(one["certified"] for one in maps),
+        }
+        rows.append((method, *found[method].values()))
+    table(("method", "seconds", "mean sym. Dirichlet", "flips", "certified"), rows)
+    ours, native = found[OURS], found[STRETCH_10]
+    verdicts.claim(
+        f"{len(surfaces)} islands of 20 triangles: all certified, and no more distortion than {STRETCH_10}",
+        ours["certified"] == len(surfaces) and ours["energy"] <= native["energy"],
+        f"{ours['seconds']:.2f} s, {STRETCH_10} {native['seconds']:.2f} s",
+    )
+    return found
+
+
+def slider(arguments, verdicts):
+    """From even areas to true angles, refined."""
+    paths = [path for path in map(find_mesh, SLID) if path]
+    meshes = {path.stem: load_mesh(path) for path in paths}
+    if len(meshes) < len(SLID):
+        made = hundred()
+        meshes |= {name: made[name] for name in list(made)[: 3 * (len(SLID) - len(meshes)) : 3]}
+    found, rows = [], []
+    for name, mesh in meshes.items():
+        surface = Surface(*mesh)
+        maps = [judged(surface, *unwrapped(mesh, balance=balance)) for balance in BALANCES]
+        found.append({"mesh": name, "triangles": len(mesh[1]), "balances": BALANCES, "maps": maps})
+        for measured in ("angle", "area"):
+            rows.append((name, measured, *(one[measured] for one in maps)))
+    table(("mesh", "distortion", *map(str, BALANCES)), rows)
+    for row in found:
+        angle, area = (np.array([one[measured] for one in row["maps"]]) for measured in ("angle", "area"))
+        holds = (np.diff(angle) < 0).all() and (np.diff(area) > 0).all()
+        flips = sum(one["flips"] for one in row["maps"])
+        verdicts.claim(f"{row['mesh']}: angle distortion falls and area distortion rises", holds, f"{flips} flips")
+    return found
+
+
+def scans(arguments, verdicts):
+    """Scanned and modelled surfaces."""
+    paths = [path for path in map(find_mesh, SCANS) if path]
+    found = []
+    for path in paths:
+        mesh = load_mesh(path)
+        if len(mesh[1]) <= arguments.largest:
+            methods = compared(path.stem, mesh, (OURS, *NATIVE), arguments.seconds)
+            found.append({"mesh": path.stem, "triangles": len(mesh[1]), **methods})
+    return found
+
+
+PARTS = {
+    "quality": quality,
+    "time": time,
+    "growth": growth,
+    "islands": islands_of_20,
+    "slider": slider,
+    "scans": scans,
+}
+
+
+def sizes_up_to(largest, sizes):
+    return [size for size in sizes if size <= largest]
+
+
+def judged(surface, seconds, uv):
+    """Time and measures of a map; its energy is infinite if there is none."""
+    if uv is None:
+        return {"seconds": seconds, "energy": np.inf, "flips": 0, "collapsed": 0, "certified": False}
+    after = measure(surface, uv)
+    return {
+        "seconds": seconds,
+        "energy": after.symmetric_dirichlet,
+        "l2_stretch": after.l2_stretch,
+        "angle": after.angle,
+        "area": after.area,
+        "flips": after.flips,
+        "collapsed": after.collapsed,
+        "certified": is_injective(uv, surface.triangles, surface.loops),
+    }
+
+
+def converged(mesh):
+    """The energy at the end of our own descent: started again until it no longer falls by 1e-4."""
+    energy, uv = np.inf, None
+    with patch.object(descent, "_NEGLIGIBLE", 1e-6):
+        while True:
+            initial = "AUTO" if uv is None else "CURRENT"
+            result = unwrap(*mesh, Settings(refine=200, initial=initial), uv, triangulate=triangulate)
+            before, energy, uv = energy, result.report.after.symmetric_dirichlet, result.uv
+            if not before - energy > 1e-4 * before:
+                return min(before, energy)
+
+
+def in_turns(mesh, methods, seconds, most=9):
+    """For each method its runs, (seconds, UVs): in turns, as many as take about these seconds, at least one."""
+    runs = {method: [] for method in methods}
+    for _ in range(most):
+        for method, done in runs.items():
+            spent = sum(each for each, _ in done)
+            if not done or spent + done[-1][0] < seconds:
+                done.append(unwrapped(mesh, method))
+    return runs
+
+
+def compared(name, mesh, methods, seconds):
+    """Print and return time, the median of several, and measures of each method on a mesh."""
+    surface, found, rows = Surface(*mesh), {}, []
+    for method, runs in in_turns(mesh, methods, seconds).items():
+        found[method] = judged(surface, median(seconds for seconds, _ in runs), runs[-1][1])
+        found[method]["runs"] = len(runs)
+    for method, one in found.items():
+        times = one["seconds"] / found[OURS]["seconds"]
+        rows.append((method, one["seconds"], one["runs"], times, one["l2_stretch"], one["energy"], one["flips"]))
+    print(f"{name}: {len(mesh[1]):,} triangles")
+    table(("method", "seconds", "runs", "times ours", "L2 stretch", "sym. Dirichlet", "flips"), rows)
+    return found
 
 
 if __name__ == "__main__":

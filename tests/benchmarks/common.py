@@ -47,6 +47,12 @@ def find_mesh(name):
     return next(Path(folder).rglob(name), None) if folder else None
 
 
+def meshes_in(folder):
+    """The meshes of a folder within QH_MESHES by name, none if there is no such folder."""
+    paths = sorted(Path(os.environ.get(MESHES, os.devnull), folder).glob("*.o[bf][jf]"))
+    return {path.stem: load_mesh(path) for path in paths}
+
+
 def given_meshes(*names):
     """The meshes of these names, as a dictionary; says so and ends the program with 0 where one is missing."""
     paths = {name: find_mesh(name) for name in names}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Surfaces of different character made from fixed seeds: vertices (n, 3) and triangles (m, 3), about as many as asked.
 
-`hundred` makes those that quality is judged on, disks with and without holes; `islands` one mesh of many pieces.
+`hundred` makes those that quality is judged on, disks with and without holes; `islands` a mesh of many pieces.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ def hills(triangles, seed=1):
 
 
 def islands(count=5000):
-    """A curved surface cut into `count` pieces of 20 triangles, an even number; the pieces share no vertices."""
+    """A curved surface cut into pieces of 20 triangles that share no vertices, and the piece (m,) of every triangle."""
     random = np.random.default_rng(1)
     across = round(np.sqrt(count / 4))
     up = -(-count // (2 * across))
@@ -51,9 +51,10 @@ def islands(count=5000):
     block_row, block_column = quad_row // 2, quad_column // 10
     second = np.where(lengthwise[block_row, block_column], quad_row % 2, quad_column % 10 // 5)
     piece = np.repeat(2 * (block_row * across + block_column) + second, 2)
-    faces, piece = faces[piece < count], piece[piece < count]
+    order = np.argsort(piece, kind="stable")[: 20 * count]
+    faces, piece = faces[order], piece[order]
     corner, corners = np.unique(piece[:, None] * len(vertices) + faces, return_inverse=True)
-    return vertices[corner % len(vertices)], corners.reshape(-1, 3)
+    return vertices[corner % len(vertices)], corners.reshape(-1, 3), piece
 
 
 # The families: a random generator and the number of triangles to a mesh
