@@ -133,10 +133,10 @@ def time(arguments, verdicts):
         for row in found:
             if row["size"] in targets:
                 least = targets[row["size"]]
-                times = row[method]["seconds"] / row[OURS]["seconds"]
+                times, best = (row[method][which] / row[OURS][which] for which in ("seconds", "best"))
                 text = f"{row['triangles']:,} triangles: at least {least} times as fast as {method}"
                 seconds = f"{row[OURS]['seconds']:.2f} s, {row[method]['seconds']:.2f} s"
-                verdicts.claim(text, times >= least, f"{times:.2f} times, {seconds}")
+                verdicts.claim(text, times >= least, f"{times:.2f} times, {seconds}; the best runs {best:.2f} times")
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4))
     for method, colour in COLOURS.items():
@@ -260,9 +260,10 @@ def sizes_up_to(largest, sizes):
 
 
 def judged(surface, seconds, uv):
-    """Time and measures of a map; its energy is infinite if there is none."""
+    """Time and measures of a map; these are infinite if there is none."""
     if uv is None:
-        return {"seconds": seconds, "energy": np.inf, "flips": 0, "collapsed": 0, "certified": False}
+        measures = dict.fromkeys(("energy", "l2_stretch", "angle", "area"), np.inf)
+        return {"seconds": seconds, **measures, "flips": 0, "collapsed": 0, "certified": False}
     after = measure(surface, uv)
     return {
         "seconds": seconds,
@@ -300,16 +301,17 @@ def in_turns(mesh, methods, seconds, most=9):
 
 
 def compared(name, mesh, methods, seconds):
-    """Print and return time, the median of several, and measures of each method on a mesh."""
+    """Print and return time, the median of several runs and the best, and measures of each method on a mesh."""
     surface, found, rows = Surface(*mesh), {}, []
     for method, runs in in_turns(mesh, methods, seconds).items():
         found[method] = judged(surface, median(seconds for seconds, _ in runs), runs[-1][1])
-        found[method]["runs"] = len(runs)
+        found[method] |= {"best": min(seconds for seconds, _ in runs), "runs": len(runs)}
     for method, one in found.items():
         times = one["seconds"] / found[OURS]["seconds"]
-        rows.append((method, one["seconds"], one["runs"], times, one["l2_stretch"], one["energy"], one["flips"]))
+        time_columns = one["seconds"], one["best"], one["runs"], times
+        rows.append((method, *time_columns, one["l2_stretch"], one["energy"], one["flips"]))
     print(f"{name}: {len(mesh[1]):,} triangles")
-    table(("method", "seconds", "runs", "times ours", "L2 stretch", "sym. Dirichlet", "flips"), rows)
+    table(("method", "seconds", "best", "runs", "times ours", "L2 stretch", "sym. Dirichlet", "flips"), rows)
     return found
 
 
