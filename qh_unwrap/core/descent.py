@@ -10,9 +10,8 @@ it has before a step as its rest shape (Jiang, Schaefer, Panozzo 2017), so that 
 import numpy as np
 
 from .quasi_harmonic import exponents
-from .surface import signed_areas
-from .tensor import area_scale, edge_matrix
-from .validity import invalid
+from .surface import hat_gradients
+from .tensor import area_scale, jacobian, jacobian_of
 
 _AIR = 0.1  # the air's part of the energy
 _FLAT = 1e-2  # of its made-up area counts a triangle that has none, so that it cannot flip either
@@ -29,28 +28,25 @@ def descend(domain, balance, steps, uv):
     `uv` holds the vertices of `domain`, a `Held` or an `Exterior`, whose air is renewed as needed.  The last step is
     the one that no longer paid.  Maps with flips are left as they are.
     """
-    scale = np.sqrt(area_scale(domain.surface, uv))
-    newton = None
+    scale = np.sqrt(area_scale(domain.surface, jacobian(domain.surface, uv)))
     for _ in range(steps):
         uv = domain.renewed(uv)
-        if newton is None or newton.surface is not domain.surface:
-            newton = _Newton(domain)
         energy = _Energy(domain.surface, uv, balance, scale)
-        start = energy.value(uv)
+        before = energy.jacobian(uv)
+        start = energy.value(before)
         if not np.isfinite(start):
             return
-        gradient, direction = newton.direction(energy, uv)
-        longest = energy.longest_step(uv, direction)
-        length, slope = min(1.0, _LONGEST * longest), float((gradient * direction).sum())
+        gradient, direction = _newton_direction(domain, energy, before)
+        change = energy.jacobian(direction)
+        length, slope = min(1.0, _LONGEST * _longest_step(before, change)), float((gradient * direction).sum())
         for _ in range(_HALVINGS):
-            moved = uv + length * direction
-            value = energy.value(moved)
-            if value <= start + _ARMIJO * length * slope and not invalid(domain.surface, moved).any():
+            value = energy.value(before + length * change)
+            if value <= start + _ARMIJO * length * slope:
                 break
             length /= 2
         else:
             return
-        uv = moved
+        uv = uv + length * direction
         done = start - value < _NEGLIGIBLE * start
         yield uv, done
         if done:
@@ -58,90 +54,100 @@ def descend(domain, balance, steps, uv):
 
 
 class _Energy:
-    """The energy of maps of a surface with air, as a weighted sum over its triangles."""
+    """The energy of maps of a surface with air, as a weighted sum over those of its triangles that can flip."""
 
     def __init__(self, surface, uv, balance, scale):
-        self.triangles = surface.triangles
+        counts = ~(surface.air & surface.degenerate)
+        if counts.all():
+            counts = slice(None)
+        self.corners = surface.triangles[counts].T.copy()
+        self.edges = surface.triangle_edges[counts].T.ravel()
         self._powers = exponents(balance)
-        rest = surface.shapes_in(uv)
-        weight = np.where(surface.air, 0, np.where(surface.degenerate, _FLAT, 1) * surface.area)
-        self.weight = weight / weight.sum()
-        (a, b), (c, d) = edge_matrix(rest) * np.where(surface.air, 1.0, scale)
-        det = a * d - b * c
-        inverse = np.array([[d, -b], [-c, a]]) / np.where(det == 0, 1.0, det)
-        self._hats = np.stack([-inverse.sum(axis=0), *inverse])  # gradients of the corners' hat functions, (3, 2, m)
-        if surface.air.any():
-            air = surface.air & ~surface.degenerate
-            self.weight[air] = _AIR * self.value(uv) / air.sum()
-        self._counts = self.weight > 0
+        air = surface.air[counts]
+        self._hats = surface.hats[..., counts] / scale
+        self._hats[..., air] = hat_gradients(uv[self.corners.T[air]])
+        weight = np.where(air, 0, np.where(surface.degenerate[counts], _FLAT, 1) * surface.area[counts])
+        self._weight = weight / weight.sum()
+        if air.any():
+            self._weight[air] = _AIR * self.value(self.jacobian(uv)) / air.sum()
 
     def jacobian(self, uv):
         """The map's derivative in every triangle, (2, 2, m)."""
-        return np.einsum("tci,cjt->ijt", uv[self.triangles], self._hats)
+        return jacobian_of(self.corners, self._hats, uv)
 
-    def value(self, uv):
-        """Infinite where a triangle that counts is flipped."""
-        (a, b), (c, d) = self.jacobian(uv)[..., self.weight > 0]
+    def value(self, jacobian):
+        """Infinite where a triangle is flipped."""
+        (a, b), (c, d) = jacobian
         det = a * d - b * c
-        if (det <= 0).any():
+        if not (det > 0).all():
             return np.inf
         p, r = self._powers
         angle, area = (a * a + b * b + c * c + d * d) / (2 * det), (det + 1 / det) / 2
-        return float(self.weight[self.weight > 0] @ (angle**p * area**r))
+        return float(self._weight @ (angle**p * area**r))
 
-    def derivatives(self, uv):
-        """The gradient by the corners (3, 2, m), and the Hessian's blocks of corners c and c + 1 (3, 2, 2, m)."""
+    def derivatives(self, jacobian):
+        """The gradient by the corners (2, 3, m), and the Hessian's blocks of the corners c and c + 1, (4, 3, m).
+
+        The rows (mean, difference, symmetric, antisymmetric) make up the blocks [[m + d, s - a], [s + a, m - d]].
+        """
         p, r = self._powers
-        (a, b), (c, d) = self.jacobian(uv)
-        # Singular values and vectors in closed form
+        (a, b), (c, d) = jacobian
+        # Singular values in closed form, and the angles of the singular vectors
         turn, shear = np.arctan2(c - b, a + d), np.arctan2(c + b, a - d)
         left, right = (turn + shear) / 2, (turn - shear) / 2
         s1 = (np.hypot(a + d, c - b) + np.hypot(a - d, c + b)) / 2
         det = a * d - b * c
-        det = np.where(self._counts, det, s1 * s1)  # triangles that do not count stay harmless
         s2 = det / s1
-        size = s1 * s1 + s2 * s2
-        beta, gamma = (det**2 - 1) / (det**2 + 1), 4 * det**2 / (det**2 + 1) ** 2
+        size, square = s1 * s1 + s2 * s2, det * det
+        beta, gamma = (square - 1) / (square + 1), 4 * square / (square + 1) ** 2
 
-        density = self.weight * (size / (2 * det)) ** p * ((det + 1 / det) / 2) ** r
+        density = self._weight * (size / (2 * det)) ** p * ((det + 1 / det) / 2) ** r
         g1 = p * (2 * s1 / size - 1 / s1) + r * beta / s1  # logarithmic derivatives
         g2 = p * (2 * s2 / size - 1 / s2) + r * beta / s2
         f11 = g1 * g1 + p * (2 / size - 4 * (s1 / size) ** 2 + 1 / s1**2) + r * (gamma - beta) / s1**2
         f22 = g2 * g2 + p * (2 / size - 4 * (s2 / size) ** 2 + 1 / s2**2) + r * (gamma - beta) / s2**2
-        f12 = g1 * g2 - 4 * p * s1 * s2 / size**2 + r * gamma / det
+        f12 = g1 * g2 - 4 * p * det / size**2 + r * gamma / det
         gap = s1 - s2
         flip = np.where(gap > 1e-6 * s1, (g1 - g2) / np.where(gap > 0, gap, 1), f11 - f12)
         twist = (g1 + g2) / (s1 + s2)
-
         f11, f12, f22 = _positive(f11, f12, f22)
-        f11, f12, f22 = density * f11, density * f12, density * f22
-        flip, twist = (density * np.maximum(each, _SMALLEST) for each in (flip, twist))
+        flip, twist = np.maximum(flip, _SMALLEST), np.maximum(twist, _SMALLEST)
         both, skew = (flip + twist) / 2, (flip - twist) / 2
 
-        # In the frame of the left singular vectors; h1 and h2 are the hats' gradients along the right ones
-        u = np.array([[np.cos(left), -np.sin(left)], [np.sin(left), np.cos(left)]])
+        # The hats' gradients along the right singular vectors: h of the corners, k of the next ones
         cos, sin = np.cos(right), np.sin(right)
-        h1, h2 = self._hats[:, 0] * cos - self._hats[:, 1] * sin, self._hats[:, 0] * sin + self._hats[:, 1] * cos
-        gradient = np.einsum("ijt,jct->cit", u, np.array([density * g1 * h1, density * g2 * h2]))
+        h1, h2 = (
+            _with_first(each)
+            for each in (
+                self._hats[:, 0] * cos - self._hats[:, 1] * sin,
+                self._hats[:, 0] * sin + self._hats[:, 1] * cos,
+            )
+        )
         k1, k2 = np.roll(h1, -1, axis=0), np.roll(h2, -1, axis=0)
+        cos, sin = np.cos(left), np.sin(left)
+        along, across = density * g1 * h1, density * g2 * h2
+        gradient = np.array([cos * along - sin * across, sin * along + cos * across])
+
+        # The blocks in the frame of the left singular vectors; turned, only the second and third row change
+        long, short = density / 2 * h1 * k1, density / 2 * h2 * k2
+        one, other = density / 2 * h1 * k2, density / 2 * h2 * k1
+        difference = (f11 - both) * long - (f22 - both) * short
+        symmetric = (f12 + skew) * (one + other)
+        cos, sin = np.cos(2 * left), np.sin(2 * left)
         blocks = np.array(
             [
-                [f11 * h1 * k1 + both * h2 * k2, f12 * h1 * k2 + skew * h2 * k1],
-                [f12 * h2 * k1 + skew * h1 * k2, f22 * h2 * k2 + both * h1 * k1],
+                (f11 + both) * long + (f22 + both) * short,
+                difference * cos - symmetric * sin,
+                difference * sin + symmetric * cos,
+                (f12 - skew) * (other - one),
             ]
         )
-        return gradient, np.einsum("iat,abct,jbt->cijt", u, blocks, u)
+        return gradient, blocks
 
-    def longest_step(self, uv, direction):
-        """The smallest positive step at which a triangle that counts collapses, or infinity."""
-        corners = self.triangles[self._counts]
-        d0, d2 = 2 * signed_areas(uv[corners]), 2 * signed_areas(direction[corners])
-        d1 = 2 * signed_areas((uv + direction)[corners]) - d0 - d2
-        # d0 + d1 t + d2 t^2 = 0; d0 is positive.  In 1 / t the smallest positive t is the largest root.
-        discriminant = d1 * d1 - 4 * d0 * d2
-        largest = (-d1 + np.sqrt(np.maximum(discriminant, 0))) / (2 * d0)
-        largest = largest[(discriminant >= 0) & (largest > 0)]
-        return 1 / largest.max() if len(largest) else np.inf
+
+def _with_first(hats):
+    # The gradients (2, m) of the second and third corners' hats, and before them the first's: all three sum to zero.
+    return np.array([-hats[0] - hats[1], *hats])
 
 
 def _positive(a, b, c):
@@ -154,39 +160,35 @@ def _positive(a, b, c):
     return middle + spread * half / radius, spread * b / radius, middle - spread * half / radius
 
 
-class _Newton:
-    """Newton directions of a domain's free vertices, both coordinates together."""
+def _longest_step(jacobian, change):
+    """The smallest positive step at which a triangle collapses, or infinity."""
+    (a, b), (c, d) = jacobian
+    (e, f), (g, h) = change
+    d0, d1, d2 = a * d - b * c, a * h + d * e - b * g - c * f, e * h - f * g
+    # d0 + d1 t + d2 t^2 = 0; d0 is positive.  In 1 / t the smallest positive t is the largest root.
+    discriminant = d1 * d1 - 4 * d0 * d2
+    largest = (-d1 + np.sqrt(np.maximum(discriminant, 0))) / (2 * d0)
+    largest = np.where(discriminant >= 0, largest, 0).max()
+    return 1 / largest if largest > 0 else np.inf
 
-    def __init__(self, domain):
-        self.surface = domain.surface
-        self._free, self._inner = domain.dirichlet.free, domain.dirichlet.inner
-        self._system = domain.dirichlet.system(width=2)
 
-    def direction(self, energy, uv):
-        """The gradient and the direction of descent, (n, 2) each, zero where held."""
-        surface, free = self.surface, self._free
-        n, k = len(uv), len(surface.edges)
-        gradient, blocks = energy.derivatives(uv)
-        corners = surface.triangles.T.ravel()
-        total = np.column_stack([np.bincount(corners, gradient[:, i].ravel(), n) for i in range(2)])
+def _newton_direction(domain, energy, jacobian):
+    """The gradient and the direction of descent, (n, 2) each, zero where held."""
+    surface, dirichlet = domain.surface, domain.dirichlet
+    n, k, free, inner = len(surface.vertices), len(surface.edges), dirichlet.free, dirichlet.inner
+    by_corner, blocks = energy.derivatives(jacobian)
+    gradient = np.zeros((n, 2))
+    for i in range(2):
+        gradient[free, i] = np.bincount(energy.corners.ravel(), by_corner[i].ravel(), n)[free]
 
-        start, end = surface.half_edges
-        edge = surface.half_edge_edges
-        backward = (start > end).reshape(3, -1)
-        blocks = np.where(backward[:, None, None], blocks.swapaxes(1, 2), blocks)  # as seen from the smaller vertex
-        sums = np.empty((k, 2, 2))
-        for i in range(2):
-            for j in range(2):
-                sums[:, i, j] = np.bincount(edge, blocks[:, i, j].ravel(), k)
-        diagonal = np.empty((n, 2, 2))
-        one, other = surface.edges.T
-        for i in range(2):
-            for j in range(2):  # moving all vertices together changes nothing
-                diagonal[:, i, j] = -np.bincount(one, sums[:, i, j], n) - np.bincount(other, sums[:, j, i], n)
-        inner = sums[self._inner]
-        solve = self._system.factor(inner, inner.swapaxes(1, 2), diagonal[free])
-        direction = np.zeros_like(uv)
-        direction[free] = -solve(total[free].ravel()).reshape(-1, 2)
-        gradient = np.zeros_like(uv)
-        gradient[free] = total[free]
-        return gradient, direction
+    backward = energy.corners > np.roll(energy.corners, -1, axis=0)
+    blocks[3] = np.where(backward, -blocks[3], blocks[3])  # transposed: as seen from the smaller vertex
+    mean, difference, symmetric, anti = (np.bincount(energy.edges, block.ravel(), k) for block in blocks)
+    one, other = surface.edges.T
+    m, d, s = (-np.bincount(one, part, n) - np.bincount(other, part, n) for part in (mean, difference, symmetric))
+    diagonal = np.array([[m + d, s], [s, m - d]])[:, :, free]  # moving all vertices together changes nothing
+    beside = np.array([[mean + difference, symmetric - anti], [symmetric + anti, mean - difference]])[:, :, inner]
+    forward, backward = beside.transpose(2, 0, 1), beside.transpose(2, 1, 0)
+    direction = np.zeros((n, 2))
+    direction[free] = -dirichlet.system.solve_blocks(forward, backward, diagonal.transpose(2, 0, 1), gradient[free])
+    return gradient, direction

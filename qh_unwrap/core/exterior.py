@@ -130,20 +130,33 @@ def _graded_points(start, end, centre, radius):
     count = np.maximum(1, np.ceil(length / finest)).astype(int)
     side = np.repeat(np.arange(len(start)), count)
     part = (np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count)) / count[side]
-    tree = cKDTree(start[side] + part[:, None] * (end - start)[side])
+    samples = start[side] + part[:, None] * (end - start)[side]
+    tree = cKDTree(samples)
 
     grids = []
     while step >= finest:
-        k = np.arange(-np.ceil(reach / step), np.ceil(reach / step) + 1)
-        column, row = (index.ravel() for index in np.meshgrid(k, k))
+        if step == coarsest:
+            cells, around, farthest = np.zeros((1, 2), np.int64), int(np.ceil(reach / step)), np.inf
+        else:  # only near the outline
+            cells, around, farthest = np.floor((samples - centre) / step).astype(np.int64), 3, 2 * step
+        column, row = _cells_around(cells, around).T
         grid = centre + step * np.column_stack([column + row % 2 / 2 + 0.25, row + 0.25])
-        farthest = np.inf if step == coarsest else 2 * step
         distance = tree.query(grid, distance_upper_bound=farthest)[0]
         inside = np.linalg.norm(grid - centre, axis=1) < reach - step / 2
         grids.append(grid[(distance >= step) & (distance < farthest) & inside])
         step /= 2
     grid = np.vstack(grids)
     return grid[~_within(grid, start, end)]
+
+
+def _cells_around(cells, width):
+    """The integer points (k, 2) that are at most `width` away from one of the `cells` (c, 2), each once."""
+    low = cells.min(axis=0) - width
+    columns = cells[:, 0].max() + width + 1 - low[0]
+    offset = np.arange(-width, width + 1)
+    number = np.unique((cells - low) @ [1, columns])
+    number = np.unique(number[:, None, None] + offset[:, None] * columns + offset)
+    return np.column_stack([number % columns, number // columns]) + low
 
 
 def _within(points, start, end):

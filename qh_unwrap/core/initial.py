@@ -4,7 +4,8 @@
 import numpy as np
 
 from .errors import UVError
-from .solver import System
+from .solver import Dirichlet
+from .surface import corner_angles, edge_lengths
 from .weights import cotangent, mean_value, uniform
 
 _WEIGHTS = {"UNIFORM": uniform, "HARMONIC": cotangent, "MEAN_VALUE": mean_value}
@@ -62,32 +63,28 @@ def project(surface):
 
 
 def conformal(surface):
-    """Conformal map with a natural boundary, (n, 2): the spectral one of Mullen, Tong, Alliez, Desbrun 2008.
+    """Conformal map with a natural boundary, (n, 2): the flattening of Sawhney, Crane 2017 that scales no outline.
 
-    The smallest eigenvector, beside the constant, of Dirichlet energy less area against the boundary's mass, by
-    inverse iteration.
+    Of all conformal maps of a disk it has the least area distortion: its scale factors exp(u) are 1 along the outline,
+    u solves Yamabe's equation, and tells how much the outline turns at each vertex.  Holes are closed meanwhile.
     """
-    n = len(surface.vertices)
-    edge = surface.half_edge_edges[surface.on_boundary]
-    start, end = (ends[surface.on_boundary] for ends in surface.half_edges)
-    length = np.linalg.norm(surface.vertices[end] - surface.vertices[start], axis=1)
-    mass = (np.bincount(start, length, n) + np.bincount(end, length, n)) / 2
-    weights = cotangent(surface)[0]
-    i, j = surface.edges.T
-    blocks = -weights[:, None, None] * np.eye(2)
-    # The layout's area is the sum of Im(conj(z_start) z_end) / 2 over its outline.
-    blocks[edge] += np.where(start < end, 0.5, -0.5)[:, None, None] * np.array([[0, -1], [1, 0]])
-    diagonal = np.bincount(i, weights, n) + np.bincount(j, weights, n)
-    diagonal += 1e-8 * diagonal.mean() * mass
-    system = System(surface.order, surface.edges, width=2)
-    solve = system.factor(blocks, blocks.swapaxes(1, 2), diagonal[:, None, None] * np.eye(2))
-    flat = project(surface)
-    z = flat[:, 0] + 1j * flat[:, 1]
-    for _ in range(50):
-        previous = z
-        z = solve((mass * z).view(float)).view(complex)
-        z -= (mass @ z) / mass.sum()
-        z /= np.sqrt(mass @ np.abs(z) ** 2)
-        if abs(np.vdot(previous * mass, z)) > 1 - 1e-10:
-            break
-    return np.column_stack([z.real, z.imag])
+    solid = surface.filled()
+    loop = surface.loops[0]
+    n = len(solid.vertices)
+    held = np.zeros(n, bool)
+    held[loop] = True
+    weights = cotangent(solid)
+    solve = Dirichlet(solid.order, solid.edges, held, np.zeros((n, 2))).factor(weights)
+    angle_sum = np.bincount(solid.triangles.ravel(), corner_angles(solid.flat).ravel(), n)
+    u = solve(np.zeros((n, 1)), (angle_sum - 2 * np.pi)[:, None])[:, 0]
+    i, j = solid.edges.T
+    flux = np.bincount(i, weights[0] * (u[i] - u[j]), n) + np.bincount(j, weights[1] * (u[j] - u[i]), n)
+
+    direction = np.cumsum(np.pi - angle_sum[loop] + flux[loop])  # of the side that follows each vertex
+    along = np.column_stack([np.cos(direction), np.sin(direction)])
+    length = edge_lengths(surface.vertices[loop])
+    # Close the outline by the least change of its lengths
+    length -= length * (along @ np.linalg.lstsq(along.T @ (length[:, None] * along), length @ along, rcond=None)[0])
+    outline = np.zeros((n, 2))
+    outline[np.roll(loop, -1)] = np.cumsum(length[:, None] * along, axis=0)
+    return solve(outline)[: len(surface.vertices)]

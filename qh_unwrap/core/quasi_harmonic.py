@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .errors import SettingsError
-from .tensor import squared_stretches
+from .tensor import area_scale, jacobian
 from .validity import Repair, invalid
 from .weights import scheme
 
@@ -66,10 +66,14 @@ def iterate(domain, settings, uv, n):
             return
         previous = uv = domain.renewed(uv)
         weights = next_weights(domain, uv)
-        uv = repair.solve(domain, weights, uv) if repairing else domain.dirichlet.solve(weights)
+        if repairing:
+            uv, valid = repair.solve(domain, weights, uv)
+        else:
+            uv = domain.dirichlet.solve(weights)
+            valid = not invalid(domain.surface, uv).any()
         change = float(np.linalg.norm((uv - previous)[:n], axis=1).max() / diameter(uv[:n]))
         converged = change <= settings.tolerance and not repair.shortened
-        yield State(iteration, uv, change, not invalid(domain.surface, uv).any(), converged, repair.active)
+        yield State(iteration, uv, change, valid, converged, repair.active)
 
 
 def check_settings(settings):
@@ -105,9 +109,11 @@ def exponents(balance):
 
 def energy(surface, uv, balance):
     """The mean of `a^p b^r` over the surface, at equal areas of surface and layout."""
-    larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
-    angle = (np.sqrt(larger / smaller) + np.sqrt(smaller / larger)) / 2
-    area = (np.sqrt(larger * smaller) + 1 / np.sqrt(larger * smaller)) / 2
+    G = jacobian(surface, uv)
+    scale = area_scale(surface, G)
+    (a, b), (c, d) = G
+    det = np.maximum(np.abs(a * d - b * c) / scale, 1e-100)
+    angle, area = (a * a + b * b + c * c + d * d) / (2 * scale * det), (det + 1 / det) / 2
     p, r = exponents(balance)
     share = np.where(surface.air | surface.degenerate, 0, surface.area)
     return float(share @ (angle**p * area**r) / share.sum())

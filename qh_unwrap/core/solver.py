@@ -2,11 +2,13 @@
 """Sparse direct solves: a nested-dissection ordering made once, and factorizations that reuse it."""
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array
+from scipy.sparse import bsr_array, coo_array, csc_array
 from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mckee
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import LinearOperator, cg, splu
 
-_LEAF = 4
+_ROUGHLY = 0.3  # the residual by the right-hand side that is small enough for a step of descent
+_STEPS = 100
+_LEAF = 8
 _FEW = 300  # vertices whose order hardly matters
 
 
@@ -17,34 +19,23 @@ class System:
     ----------
     order : (n,), in which the vertices are eliminated
     edges : (k, 2)
-    width : unknowns of each vertex; entries are blocks (width, width)
+
+    A matrix is given by its entries (i, j), (j, i) and (i, i): arrays (k, ...), (k, ...) and (n, ...).
     """
 
-    def __init__(self, order, edges, width=1):
+    def __init__(self, order, edges):
         n = len(order)
         place = np.empty(n, dtype=np.int64)
         place[order] = np.arange(n)
         i, j = place[edges].T
-        part = np.arange(width)
-        row = width * np.concatenate([i, j, place])[:, None, None] + part[:, None]
-        column = width * np.concatenate([j, i, place])[:, None, None] + part
-        row, column = (each.ravel() for each in np.broadcast_arrays(row, column))
-        self._order = (width * order[:, None] + part).ravel()
-        self._entry = np.lexsort((row, column))
-        self._indices = row[self._entry].astype(np.int32)
-        self._indptr = np.searchsorted(column[self._entry], np.arange(width * n + 1)).astype(np.int32)
+        where = np.concatenate([i, j, place]), np.concatenate([j, i, place])
+        pattern = coo_array((np.arange(2 * len(edges) + n), where), shape=(n, n)).tocsc()
+        self._order = order
+        self._entry, self._indices, self._indptr = pattern.data, pattern.indices, pattern.indptr
 
     def factor(self, forward, backward, diagonal):
-        """A solver of right-hand sides (width * n, ...) for the matrix with the entries (i, j), (j, i) and (i, i).
-
-        Entries are (k, ...), (k, ...) and (n, ...), with blocks where `width` is not 1.
-        """
-        size = len(self._order)
-        entries = np.concatenate([forward, backward, diagonal]).ravel()[self._entry]
-        matrix = csc_array((entries, self._indices, self._indptr), shape=(size, size))
-        # The order is ours, and the matrices are dominated by their diagonals: no column ordering, no pivoting.
-        options = {"SymmetricMode": True}
-        factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+        """A solver of right-hand sides (n, ...) for the matrix."""
+        factors = self._factors(forward, backward, diagonal)
 
         def solve(rhs):
             result = np.empty_like(rhs)
@@ -53,9 +44,35 @@ class System:
 
         return solve
 
+    def solve_blocks(self, forward, backward, diagonal, rhs):
+        """Solve roughly, for right-hand sides (n, 2) and a symmetric positive definite matrix of blocks (2, 2).
+
+        Conjugate gradients, with the mean of both coordinates' own matrices as preconditioner.
+        """
+        n = len(self._order)
+        own = (np.trace(entries, axis1=1, axis2=2) / 2 for entries in (forward, backward, diagonal))
+        factors = self._factors(*own)
+        entries = np.concatenate([backward, forward, diagonal])[
+            self._entry
+        ]  # the pattern is by columns, blocks by rows
+        matrix = bsr_array((entries, self._indices, self._indptr), shape=(2 * n, 2 * n))
+        mean = LinearOperator(matrix.shape, lambda residual: factors.solve(residual.reshape(-1, 2)).ravel())
+        solution, _ = cg(matrix, rhs[self._order].ravel(), rtol=_ROUGHLY, maxiter=_STEPS, M=mean)
+        result = np.empty_like(rhs)
+        result[self._order] = solution.reshape(-1, 2)
+        return result
+
+    def _factors(self, forward, backward, diagonal):
+        n = len(self._order)
+        entries = np.concatenate([forward, backward, diagonal])[self._entry]
+        matrix = csc_array((entries, self._indices, self._indptr), shape=(n, n))
+        # The order is ours, and the matrices are dominated by their diagonals: no column ordering, no pivoting.
+        options = {"SymmetricMode": True}
+        return splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+
 
 class Dirichlet:
-    """Solves `sum_j w_ij (f_i - f_j) = 0` (eq. 2) for the free vertices while the others are held.
+    """Solves `sum_j w_ij (f_i - f_j) = g_i` (eq. 2, with a source g) for the free vertices while the others are held.
 
     Parameters
     ----------
@@ -71,13 +88,8 @@ class Dirichlet:
         self.free = np.flatnonzero(~held)
         self.inner = np.flatnonzero(~held[edges].any(axis=1))
         self._edges = edges
-        self._order = order
-        self._system = self.system()
-
-    def system(self, width=1):
-        """A `System` of the free vertices, in their order, and of the edges `inner` between them."""
-        local = np.cumsum(~self.held) - 1
-        return System(local[self._order[~self.held[self._order]]], local[self._edges[self.inner]], width)
+        local = np.cumsum(~held) - 1
+        self.system = System(local[order[~held[order]]], local[edges[self.inner]])  # of the free vertices
 
     def diagonal(self, weights):
         """The sum of the weights around every vertex, (n,)."""
@@ -86,19 +98,27 @@ class Dirichlet:
         return np.bincount(i, weights[0], n) + np.bincount(j, weights[1], n)
 
     def solve(self, weights):
-        """All vertices (n, 2), for the weights (2, k)."""
-        if not len(self.free):
-            return self.values.copy()
+        """All vertices (n, 2), for the weights (2, k) and no source."""
+        return self.factor(weights)(self.values)
+
+    def factor(self, weights):
+        """A function of values (n, c), used where held, and sources (n, c) that solves for all vertices (n, c)."""
         i, j = self._edges.T
         n = len(self.held)
-        rhs = [
-            np.bincount(i, weights[0] * known[j], n) + np.bincount(j, weights[1] * known[i], n)
-            for known in self.values.T
-        ]
-        forward, backward = -weights[:, self.inner]
-        solve = self._system.factor(forward, backward, self.diagonal(weights)[self.free])
-        result = self.values.copy()
-        result[self.free] = solve(np.column_stack(rhs)[self.free])
+        if len(self.free):
+            forward, backward = -weights[:, self.inner]
+            solve = self.system.factor(forward, backward, self.diagonal(weights)[self.free])
+
+        def result(values, sources=0.0):
+            values = np.where(self.held[:, None], values, 0.0)
+            if len(self.free):
+                flux = [
+                    np.bincount(i, weights[0] * known[j], n) + np.bincount(j, weights[1] * known[i], n)
+                    for known in values.T
+                ]
+                values[self.free] = solve((np.column_stack(flux) + sources)[self.free])
+            return values
+
         return result
 
 

@@ -164,6 +164,11 @@ class Surface:
         return sorted(loops, key=lambda loop: (-round(perimeter(self.vertices[loop]), 12), loop[0]))
 
     @cached_property
+    def hats(self):
+        """Gradients, in `flat`, of the hat functions of every triangle's second and third corners, (2, 2, m)."""
+        return hat_gradients(self.flat)
+
+    @cached_property
     def order(self):
         """The order in which systems on the surface eliminate its vertices, (n,)."""
         return nested_dissection(self.vertices, self.edges)
@@ -198,6 +203,7 @@ class Surface:
         wider._number_edges()
         some_shape = np.broadcast_to([[0.0, 0], [1, 0], [0, 1]], (len(triangles), 3, 2))
         wider.flat = np.concatenate([self.flat, some_shape])
+        wider.hats = np.concatenate([self.hats, hat_gradients(some_shape)], axis=2)
         wider.area, wider.degenerate = (np.pad(each, (0, len(triangles))) for each in (self.area, self.degenerate))
         wider.air = np.pad(self.air, (0, len(triangles)), constant_values=True)
         wider.order = nested_dissection(uv, wider.edges)
@@ -269,6 +275,13 @@ def signed_areas(corners):
     """Signed areas of plane triangles (m, 3, 2), positive counter-clockwise."""
     (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     return 0.5 * (ax * by - ay * bx)
+
+
+def hat_gradients(corners):
+    """Gradients of the hat functions of the second and third corners of plane triangles (m, 3, 2), (2, 2, m)."""
+    (a, c), (b, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    det = a * d - b * c
+    return np.array([[d / det, -b / det], [-c / det, a / det]])
 
 
 def corner_angles(corners):

@@ -16,28 +16,24 @@ from .surface import signed_areas
 _SMALLEST = 1e-12  # squared stretches, and their ratios, are kept within this and its inverse
 
 
-def edge_matrix(corners):
-    """Edges 0-1 and 0-2 of plane triangles (m, 3, 2) as the columns of a (2, 2, m) field."""
-    return np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1).T.copy()
-
-
 def jacobian(surface, uv):
     """Jacobian of the map from the surface to the plane in every triangle, (2, 2, m)."""
-    (e11, e12), (e21, e22) = edge_matrix(uv[surface.triangles])
-    (p11, p12), (p21, p22) = edge_matrix(surface.flat)
-    det = p11 * p22 - p12 * p21
-    return np.array(
-        [
-            [(e11 * p22 - e12 * p21) / det, (e12 * p11 - e11 * p12) / det],
-            [(e21 * p22 - e22 * p21) / det, (e22 * p11 - e21 * p12) / det],
-        ]
-    )
+    return jacobian_of(surface.triangles.T, surface.hats, uv)
 
 
-def area_scale(surface, uv):
+def jacobian_of(corners, hats, uv):
+    """The same for triangles with the `corners` (3, m) and the `hats` that a surface has, (2, 2, m)."""
+    x, y = uv[:, 0][corners], uv[:, 1][corners]
+    (ax, bx), (ay, by) = x[1:] - x[0], y[1:] - y[0]
+    (h1, h2), (k1, k2) = hats
+    return np.array([[ax * h1 + bx * k1, ax * h2 + bx * k2], [ay * h1 + by * k1, ay * h2 + by * k2]])
+
+
+def area_scale(surface, jacobian):
     """The layout's area by the surface's, never zero; dividing squared stretches by it makes them free of scale."""
-    solid = ~surface.air
-    return max(abs(signed_areas(uv[surface.triangles])[solid].sum()) / surface.area[solid].sum(), 1e-300)
+    (a, b), (c, d) = jacobian
+    area = np.where(surface.air, 0, surface.area)
+    return max(abs(area @ (a * d - b * c)) / area.sum(), 1e-300)
 
 
 def squared_stretches(surface, uv, side="right", smallest=_SMALLEST):
@@ -47,9 +43,9 @@ def squared_stretches(surface, uv, side="right", smallest=_SMALLEST):
     Returns (larger, smaller, cos 2 theta, sin 2 theta), each (m,).
     """
     G = jacobian(surface, uv)
+    scale = area_scale(surface, G)
     (g11, g12), (g21, g22) = G if side == "right" else G.swapaxes(0, 1)
     a, b, c = g11**2 + g21**2, g12**2 + g22**2, g11 * g12 + g21 * g22
-    scale = area_scale(surface, uv)
     half_difference, mean = (a - b) / 2, (a + b) / 2
     radius = np.hypot(half_difference, c)
     larger = mean + radius

@@ -11,14 +11,16 @@ from .distortion import Distortion, checked_uv, measure
 from .errors import BoundaryError, PinError, UVError
 from .exterior import Exterior
 from .initial import conformal, fit, initial_map, project
-from .quasi_harmonic import Held, check_settings, diameter, energy, iterate
+from .quasi_harmonic import Held, State, check_settings, diameter, energy, iterate
 from .settings import Settings
 from .solver import Dirichlet
 from .surface import Surface
 from .validity import enclosed_area, invalid, is_injective
 
-_HANDOVER = 0.3  # an iteration that lowers the energy by less than this part of it gives way to the refinement
-_ISOMETRIC = 1 + 1e-9  # the energy of a map that nothing can better
+_HANDOVER = 0.9  # an iteration that lowers the energy by less than this part of it gives way to the refinement
+_ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
+# The starts to choose from, the cheapest first, and the energy that needs no further one
+_STARTS = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "MEAN_VALUE": np.inf}
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,35 +111,17 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
     else:
         domain, start, warnings = _held(surface, settings, given, pinned)
 
-    changes, best, least = [], None, np.inf
-    refining = settings.refine and settings.iterations and settings.weights == "COTANGENT"
-    for state in iterate(domain, settings, start, n):
-        if state.iteration:
-            changes.append(state.change)
-            yield replace(state, uv=state.uv[:n] * mirror)
-        # Repairs and new air make the energy rise and fall: keep the best valid map from then on.
-        uneven = state.repaired or refining or settings.boundary == "FREE"
-        if state.valid and not invalid(surface, placed(state.uv[:n])).any():
-            value = energy(surface, state.uv[:n], settings.balance) if uneven else np.inf
-            gain = least - value
-            if best is None or not uneven or value < least:
-                best, least = state, value
-            if refining and len(changes) > 1 and gain < _HANDOVER * least:
-                break
-    last = state
-    if best is not None and uneven:
-        state = best
-    converged = last.converged
-    if refining and state.valid:
-        refined = state.uv if state is last else domain.recalled(state.uv, n)
-        steps = () if refined is None else descend(domain, settings.balance, settings.refine, refined)
-        for refined, done in steps:
-            if invalid(surface, placed(refined[:n])).any():
-                break
-            changes.append(float(np.linalg.norm(refined[:n] - state.uv[:n], axis=1).max() / diameter(refined[:n])))
-            state, converged = replace(state, iteration=len(changes), uv=refined, change=changes[-1]), done
-            yield replace(state, uv=refined[:n] * mirror)
-    chosen = placed(state.uv[:n])
+    improving = _improved(surface, domain, settings, start, placed)
+    changes = []
+    while True:
+        try:
+            state = next(improving)
+        except StopIteration as stop:
+            uv, converged = stop.value
+            break
+        changes.append(state.change)
+        yield replace(state, uv=state.uv[:n] * mirror)
+    chosen = placed(uv[:n])
 
     if surface.degenerate.any():
         warnings += (f"{surface.degenerate.sum()} faces have zero area",)
@@ -153,6 +137,46 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
         warnings=warnings,
     )
     return Result(chosen * mirror, report)
+
+
+def _improved(surface, domain, settings, start, placed):
+    """Iterate and refine; yields a `State` after each step and returns the best map and whether it converged.
+
+    Where it matters that a map is valid, it matters where `placed` puts it.
+    """
+    n = len(surface.vertices)
+    refining = settings.refine and settings.iterations and settings.weights == "COTANGENT"
+    best, least = None, np.inf
+    for state in iterate(domain, settings, start, n):
+        if state.iteration:
+            yield state
+        # Repairs and new air make the energy rise and fall: keep the best valid map from then on.
+        uneven = state.repaired or refining or settings.boundary == "FREE"
+        if state.valid and not invalid(surface, placed(state.uv[:n])).any():
+            value = energy(surface, state.uv[:n], settings.balance) if uneven else np.inf
+            if refining and value <= _ISOMETRIC:
+                return state.uv, True
+            enough = refining and state.iteration and value > (1 - _HANDOVER) * least
+            if best is None or not uneven or value < least:
+                best, least = state, value
+            if enough:
+                break
+    last = state
+    if best is not None and uneven:
+        state = best
+    uv, converged = state.uv, last.converged
+    if refining and state.valid:
+        refined = uv if state is last else domain.recalled(uv, n)
+        steps = () if refined is None else descend(domain, settings.balance, settings.refine, refined)
+        previous = uv[:n]
+        for number, (refined, done) in enumerate(steps, start=last.iteration + 1):
+            change = float(np.linalg.norm(refined[:n] - previous, axis=1).max() / diameter(refined[:n]))
+            valid = not invalid(surface, placed(refined[:n])).any()
+            yield State(number, refined, change, valid, done, state.repaired)
+            previous = refined[:n]
+            if valid:
+                uv, converged = refined, done
+    return uv, converged
 
 
 def _in_unit_square(uv):
@@ -196,8 +220,8 @@ def _free(surface, settings, uv, pinned, triangulate):
         start = _natural_start(surface, settings, settings.initial, uv)
     if pinned.any():
         start = np.where(pinned[:, None], uv, fit(start, pinned, uv))
-    if not settings.iterations:
-        return exterior, start, warnings
+    if not settings.iterations or (settings.refine and energy(surface, start, settings.balance) <= _ISOMETRIC):
+        return exterior, start, warnings  # which need no air
     with_air = exterior.renewed(start)
     if with_air is None:
         circle = _natural_start(surface, settings, "MEAN_VALUE", uv)
@@ -232,14 +256,14 @@ def _natural_start(surface, settings, initial, uv):
 
 
 def _best_start(surface, settings):
-    """Of the certified natural maps the one of least energy; if there is none, the mean value map in a circle."""
+    """Of the certified natural maps a good one, or that of least energy; without any, the mean value map in a circle."""
     best, least = None, np.inf
-    for initial in ("PROJECTION", "CONFORMAL", "MEAN_VALUE"):
+    for initial, enough in _STARTS.items():
         start = _natural_start(surface, settings, initial, None)
         value = energy(surface, start, settings.balance)
         if value < least and is_injective(start, surface.triangles, surface.loops):
             best, least = start, value
-        if least < _ISOMETRIC:
+        if least < enough:
             break
     return start if best is None else best
 

@@ -15,14 +15,40 @@ def turn(a, b, c):
     """1 where the points a, b, c (n, 2) turn left, -1 where they turn right, 0 where they lie on a line: exactly."""
     first = (b - a)[:, 0] * (c - a)[:, 1]
     second = (b - a)[:, 1] * (c - a)[:, 0]
-    result = np.sign(first - second).astype(np.int8)
-    # Where the two nearly cancel, rounding decides; then count in fractions (Shewchuk 1997 bounds the error).
-    close = np.abs(first - second) <= 1e-15 * (np.abs(first) + np.abs(second))
-    for k in np.flatnonzero(close & (first != 0) & (second != 0)):
+    apart = first - second
+    result = np.sign(apart).astype(np.int8)
+    # Where the two nearly cancel, rounding decides (Shewchuk 1997 bounds the error): then look closer.
+    close = np.abs(apart) <= 1e-15 * (np.abs(first) + np.abs(second))
+    close = np.flatnonzero(close & (first != 0) & (second != 0))
+    if len(close):
+        result[close] = _exact_turn(a[close], b[close], c[close])
+    return result
+
+
+def _exact_turn(a, b, c):
+    (bx, by), (cx, cy) = (b - a).T, (c - a).T
+    first, second = bx * cy, by * cx
+    # Rounding keeps the order of numbers: the exact products differ as the rounded ones do, or else as their errors.
+    result = np.sign(np.where(first == second, _error(bx, cy) - _error(by, cx), first - second)).astype(np.int8)
+    rounded = ((b - a) + a != b) | ((b - a) - b != -a) | ((c - a) + a != c) | ((c - a) - c != -a)
+    for k in np.flatnonzero(rounded.any(axis=1)):  # the differences already are no longer exact: count in fractions
         (ax, ay), (bx, by), (cx, cy) = ([Fraction(value) for value in point[k].tolist()] for point in (a, b, c))
         det = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         result[k] = (det > 0) - (det < 0)
     return result
+
+
+def _error(x, y):
+    # What the product x * y loses by rounding, exactly (Dekker 1971).
+    (x1, x2), (y1, y2) = (_halves(x), _halves(y))
+    return x1 * y1 - x * y + x1 * y2 + x2 * y1 + x2 * y2
+
+
+def _halves(x):
+    # The upper and the lower half of the digits.
+    scaled = 134217729 * x  # 2^27 + 1
+    upper = scaled - (scaled - x)
+    return upper, x - upper
 
 
 def as_stored(uv):
@@ -117,7 +143,7 @@ class Repair:
         self._marked = np.zeros(0, bool)
 
     def solve(self, domain, weights, previous):
-        """Solve with symmetric `weights` (2, k); where the island flips, again with raised weights.
+        """The map for symmetric `weights` (2, k) and whether it is valid; where the island flips, with raised weights.
 
         If that does not help, or only air flips, go part of the way from the `previous` map, where that one is valid.
         """
@@ -132,7 +158,7 @@ class Repair:
             wrong = invalid(surface, uv)
             if not wrong.any():
                 self._marked = marked
-                return uv
+                return uv, True
             self.active = True
             if not wrong[~surface.air].any():
                 break
@@ -145,9 +171,9 @@ class Repair:
             for halving in range(1, _HALVINGS + 1):
                 shorter = previous + (uv - previous) / 2**halving
                 if not invalid(surface, shorter).any():
-                    return shorter
-            return previous
-        return uv
+                    return shorter, True
+            return previous, True
+        return uv, False
 
 
 def _floored(dirichlet, edges, weights, marked):

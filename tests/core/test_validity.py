@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
 from qh_unwrap.core import Surface
-from qh_unwrap.core.validity import count_crossings, enclosed_area, is_injective, orientation
+from qh_unwrap.core.validity import count_crossings, enclosed_area, is_injective, orientation, turn
 
 from . import shapes
 
@@ -15,6 +17,21 @@ def test_orientation_is_that_of_the_stored_floats():
     # An exact sign where doubles cancel: nearly collinear points of very different size
     uv = np.array([[1e-30, 0], [1.0, 1.0], [2.0, 2.0]])
     assert orientation(uv, np.array([[0, 1, 2], [1, 0, 2]])).tolist() == [-1, 1]
+
+
+def test_turns_are_those_of_exact_arithmetic():
+    rng = np.random.default_rng(1)
+    points = rng.integers(-3, 4, (3, 4000, 2)) * 0.1
+    points[:, 1000:] += rng.choice([0, 1e-16, 1e-9, 1 / 3], (3, 3000, 2))
+    points[:, 2000:] = points[:, 2000:].astype(np.float32)
+    points[:, 3000:] *= 2.0 ** rng.integers(-40, 40, (3, 1000, 2))
+    exact = []
+    for a, b, c in zip(*points.tolist(), strict=True):
+        (ax, ay), (bx, by), (cx, cy) = (map(Fraction, point) for point in (a, b, c))
+        det = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        exact.append((det > 0) - (det < 0))
+    assert turn(*points).tolist() == exact
+    assert exact.count(0) > 100
 
 
 def test_enclosed_area():
