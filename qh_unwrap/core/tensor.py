@@ -11,8 +11,6 @@ values are the eigenvalues of `G^T G`; the paper's first fundamental form (eq. 4
 
 import numpy as np
 
-from .surface import signed_areas
-
 _SMALLEST = 1e-12  # squared stretches, and their ratios, are kept within this and its inverse
 
 

@@ -256,7 +256,7 @@ def _natural_start(surface, settings, initial, uv):
 
 
 def _best_start(surface, settings):
-    """Of the certified natural maps a good one, or that of least energy; without any, the mean value map in a circle."""
+    """Of the certified natural maps a good one, or that of least energy; if there is none, the last."""
     best, least = None, np.inf
     for initial, enough in _STARTS.items():
         start = _natural_start(surface, settings, initial, None)
