@@ -10,6 +10,7 @@ from .quasi_harmonic import State
 from .refinement import has_positive_weights, refine_obtuse
 from .settings import Settings
 from .surface import Surface
+from .together import unwrap_together
 from .unwrapping import Report, Result, unwrap, unwrap_steps
 
 __all__ = [
@@ -25,4 +26,5 @@ __all__ = [
     "refine_obtuse",
     "unwrap",
     "unwrap_steps",
+    "unwrap_together",
 ]

@@ -23,52 +23,69 @@ _NEGLIGIBLE = 1e-3  # a decrease of the energy by this part of it is not worth a
 
 
 def descend(domain, balance, steps, uv):
-    """Lower the energy of the map `uv` in at most so many Newton steps; yields each map and whether it was the last.
+    """Lower the energy of the map `uv` in at most so many Newton steps; yields each map and which pieces are done.
 
-    `uv` holds the vertices of `domain`, a `Held` or an `Exterior`, whose air is renewed as needed.  The last step is
-    the one that no longer paid.  Maps with flips are left as they are.
+    `uv` holds the vertices of `domain`, a `Held` or an `Exterior`, whose air is renewed as needed.  The last step of a
+    piece is the one that no longer paid; the last of all ends it.  Maps with flips are left as they are.
     """
-    scale = np.sqrt(area_scale(domain.surface, jacobian(domain.surface, uv)))
+    size = np.sqrt(area_scale(domain.surface, jacobian(domain.surface, uv)))[domain.surface.triangle_starts]
     for _ in range(steps):
         uv = domain.renewed(uv)
-        energy = _Energy(domain.surface, uv, balance, scale)
+        surface = domain.surface
+        energy = _Energy(surface, uv, balance, size)
         before = energy.jacobian(uv)
         start = energy.value(before)
-        if not np.isfinite(start):
+        if not np.isfinite(start).all():
             return
         gradient, direction = _newton_direction(domain, energy, before)
         change = energy.jacobian(direction)
-        length, slope = min(1.0, _LONGEST * _longest_step(before, change)), float((gradient * direction).sum())
+        length = np.minimum(1.0, _LONGEST * energy.longest_step(before, change))
+        slope = np.add.reduceat((gradient * direction).sum(axis=1), surface.vertex_starts)
         for _ in range(_HALVINGS):
-            value = energy.value(before + length * change)
-            if value <= start + _ARMIJO * length * slope:
+            value = energy.value(before + length[energy.piece] * change)
+            steep = ~(value <= start + _ARMIJO * length * slope)
+            if not steep.any():
                 break
-            length /= 2
+            length[steep] /= 2
         else:
-            return
-        uv = uv + length * direction
-        done = start - value < _NEGLIGIBLE * start
+            length[steep] = 0
+            if steep.all():
+                return
+        uv = uv + length[surface.vertex_piece, None] * direction
+        done = (length == 0) | (start - value < _NEGLIGIBLE * start)
         yield uv, done
-        if done:
+        if done.all():
             return
+
+
+def energies(surface, uv, balance):
+    """The energy of every piece's map, at equal areas of surface and layout, (p,); infinite where one is flipped."""
+    size = np.sqrt(area_scale(surface, jacobian(surface, uv)))[surface.triangle_starts]
+    energy = _Energy(surface, uv, balance, size)
+    return energy.value(energy.jacobian(uv))
 
 
 class _Energy:
-    """The energy of maps of a surface with air, as a weighted sum over those of its triangles that can flip."""
+    """The energy of maps of a surface with air, as a weighted sum over those of each piece's triangles that can flip.
 
-    def __init__(self, surface, uv, balance, scale):
+    `size` (p,) is the scale of each piece's map that the energy aims at.
+    """
+
+    def __init__(self, surface, uv, balance, size):
         counts = ~(surface.air & surface.degenerate)
         if counts.all():
             counts = slice(None)
+        self.piece = surface.piece[counts]
+        self._starts = surface.triangle_starts
         self.corners = surface.triangles[counts].T.copy()
         self.edges = surface.triangle_edges[counts].T.ravel()
         self._powers = exponents(balance)
         air = surface.air[counts]
-        self._hats = surface.hats[..., counts] / scale
+        self._hats = surface.hats[..., counts] / size[self.piece]
         self._hats[..., air] = hat_gradients(uv[self.corners.T[air]])
         weight = np.where(air, 0, np.where(surface.degenerate[counts], _FLAT, 1) * surface.area[counts])
-        self._weight = weight / weight.sum()
-        if air.any():
+        self._weight = weight / np.add.reduceat(weight, self._starts)[self.piece]
+        if air.any():  # there is one piece
             self._weight[air] = _AIR * self.value(self.jacobian(uv)) / air.sum()
 
     def jacobian(self, uv):
@@ -76,14 +93,25 @@ class _Energy:
         return jacobian_of(self.corners, self._hats, uv)
 
     def value(self, jacobian):
-        """Infinite where a triangle is flipped."""
+        """Of each piece, (p,), infinite where a triangle is flipped."""
         (a, b), (c, d) = jacobian
         det = a * d - b * c
-        if not (det > 0).all():
-            return np.inf
+        flipped = ~(det > 0)
+        det = np.where(flipped, 1.0, det)
         p, r = self._powers
         angle, area = (a * a + b * b + c * c + d * d) / (2 * det), (det + 1 / det) / 2
-        return float(self._weight @ (angle**p * area**r))
+        return np.add.reduceat(np.where(flipped, np.inf, self._weight * (angle**p * area**r)), self._starts)
+
+    def longest_step(self, jacobian, change):
+        """The smallest positive step of each piece at which a triangle collapses, (p,), or infinity."""
+        (a, b), (c, d) = jacobian
+        (e, f), (g, h) = change
+        d0, d1, d2 = a * d - b * c, a * h + d * e - b * g - c * f, e * h - f * g
+        # d0 + d1 t + d2 t^2 = 0; d0 is positive.  In 1 / t the smallest positive t is the largest root.
+        discriminant = d1 * d1 - 4 * d0 * d2
+        root = (-d1 + np.sqrt(np.maximum(discriminant, 0))) / (2 * d0)
+        largest = np.maximum.reduceat(np.where(discriminant >= 0, root, 0), self._starts)
+        return 1 / np.maximum(largest, 1e-300)
 
     def derivatives(self, jacobian):
         """The gradient by the corners (2, 3, m), and the Hessian's blocks of the corners c and c + 1, (4, 3, m).
@@ -158,18 +186,6 @@ def _positive(a, b, c):
     radius = np.maximum(radius, np.finfo(float).tiny)
     middle, spread = (high + low) / 2, (high - low) / 2
     return middle + spread * half / radius, spread * b / radius, middle - spread * half / radius
-
-
-def _longest_step(jacobian, change):
-    """The smallest positive step at which a triangle collapses, or infinity."""
-    (a, b), (c, d) = jacobian
-    (e, f), (g, h) = change
-    d0, d1, d2 = a * d - b * c, a * h + d * e - b * g - c * f, e * h - f * g
-    # d0 + d1 t + d2 t^2 = 0; d0 is positive.  In 1 / t the smallest positive t is the largest root.
-    discriminant = d1 * d1 - 4 * d0 * d2
-    largest = (-d1 + np.sqrt(np.maximum(discriminant, 0))) / (2 * d0)
-    largest = np.where(discriminant >= 0, largest, 0).max()
-    return 1 / largest if largest > 0 else np.inf
 
 
 def _newton_direction(domain, energy, jacobian):

@@ -39,27 +39,30 @@ class Distortion:
 
 
 def measure(surface, uv):
-    """The `Distortion` of the map `uv` (n, 2) of a `Surface`."""
+    """The `Distortion` of the map `uv` (n, 2) of a `Surface` of one piece."""
+    return measure_pieces(surface, uv)[0]
+
+
+def measure_pieces(surface, uv):
+    """The `Distortion` of every piece's map, a list."""
     larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
     share = np.where(surface.degenerate, 0, surface.area)
-    share /= share.sum()
+    share /= surface.sums(share)[surface.piece]
     stretch = (1 / larger + 1 / smaller) / 2
     angle = np.sqrt(larger / smaller)
     log_area = (np.log(larger) + np.log(smaller)) / 2
     sign = orientation(uv, surface.triangles)
     sign[(sign == 0) & surface.degenerate] = 1
-    return Distortion(
-        l2_stretch=float(np.sqrt(share @ stretch)),
-        symmetric_dirichlet=float(share @ (larger + smaller + 1 / larger + 1 / smaller) / 4),
-        angle=float(share @ angle),
-        area=float(np.sqrt(share @ log_area**2)),
-        flips=int(np.sum(sign < 0)),
-        collapsed=int(np.sum(sign == 0)),
-        triangle_stretch=np.sqrt(stretch),
-        triangle_angle=angle,
-        triangle_log_area=log_area,
-        triangle_orientation=sign,
+    numbers = (
+        np.sqrt(surface.sums(share * stretch)).tolist(),
+        surface.sums(share * (larger + smaller + 1 / larger + 1 / smaller) / 4).tolist(),
+        surface.sums(share * angle).tolist(),
+        np.sqrt(surface.sums(share * log_area**2)).tolist(),
+        surface.sums((sign < 0).astype(int)).tolist(),
+        surface.sums((sign == 0).astype(int)).tolist(),
     )
+    arrays = (np.split(each, surface.triangle_starts[1:]) for each in (np.sqrt(stretch), angle, log_area, sign))
+    return [Distortion(*values) for values in zip(*numbers, *arrays, strict=True)]
 
 
 def distortion(vertices, triangles, uv):

@@ -5,7 +5,7 @@ import numpy as np
 
 from .errors import UVError
 from .solver import Dirichlet
-from .surface import corner_angles, edge_lengths
+from .surface import corner_angles
 from .weights import cotangent, mean_value, uniform
 
 _WEIGHTS = {"UNIFORM": uniform, "HARMONIC": cotangent, "MEAN_VALUE": mean_value}
@@ -44,32 +44,42 @@ def _fit(z, chosen, target):
 
 
 def project(surface):
-    """Projection on the least-squares plane, seen from the side that its faces turn to, (n, 2)."""
-    corners = surface.vertices[surface.triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    share = np.linalg.norm(normal, axis=1) / np.linalg.norm(normal, axis=1).sum()
-    corners = corners - share @ corners.mean(axis=1)
+    """Projection of every piece on its least-squares plane, seen from the side that its faces turn to, (n, 2)."""
+    a, b, c = surface.vertices[surface.triangles].transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    share = np.linalg.norm(normal, axis=1, keepdims=True)
+    starts, piece = surface.triangle_starts, surface.piece
+    share /= np.add.reduceat(share, starts)[piece]
+    centre = np.add.reduceat(share * (a + b + c), starts) / 3
     # The second moments of a triangle are those of its corners and of three times its centre, each a twelfth.
-    points = np.vstack([*corners.transpose(1, 0, 2), corners.sum(axis=1)])
-    axes = np.linalg.eigh(points.T @ (np.tile(share, 4)[:, None] * points))[1]  # the least extent comes first
-    across, right = axes[:, 0], axes[:, 2]
-    if normal.sum(axis=0) @ across < 0:
-        across = -across
+    points = [corner - centre[piece] for corner in (a, b, c)]
+    points.append(sum(points))
+    moments = sum(np.add.reduceat((share * p)[:, :, None] * p[:, None], starts) for p in points)
+    axes = np.linalg.eigh(moments)[1]  # the least extent comes first
+    across, right = axes[:, :, 0], axes[:, :, 2]
+    back = (np.add.reduceat(normal, starts) * across).sum(axis=1) < 0
+    across = np.where(back[:, None], -across, across)
     # Of the two ways round, the one with the farther end to the right: it turns with the surface.
-    extent = surface.vertices @ right
-    if extent.max() < -extent.min():
-        right = -right
-    return surface.vertices @ np.column_stack([right, np.cross(across, right)])
+    piece, starts = surface.vertex_piece, surface.vertex_starts
+    along = (surface.vertices * right[piece]).sum(axis=1)
+    left = np.maximum.reduceat(along, starts) < -np.minimum.reduceat(along, starts)
+    right = np.where(left[:, None], -right, right)
+    along = np.where(left[piece], -along, along)
+    return np.column_stack([along, (surface.vertices * np.cross(across, right)[piece]).sum(axis=1)])
 
 
 def conformal(surface):
-    """Conformal map with a natural boundary, (n, 2): the flattening of Sawhney, Crane 2017 that scales no outline.
+    """Conformal map of every piece with a natural boundary, (n, 2): the flattening of Sawhney, Crane 2017 that scales
+    no outline.
 
     Of all conformal maps of a disk it has the least area distortion: its scale factors exp(u) are 1 along the outline,
-    u solves Yamabe's equation, and tells how much the outline turns at each vertex.  Holes are closed meanwhile.
+    u solves Yamabe's equation, and tells how much the outline turns at each vertex.  Holes are closed meanwhile, if
+    there is only one piece; several must have none.
     """
     solid = surface.filled()
-    loop = surface.loops[0]
+    outlines = surface.loops[: len(surface.vertex_starts)]
+    loop = np.concatenate(outlines)
+    starts = np.cumsum([0, *(len(outline) for outline in outlines[:-1])])
     n = len(solid.vertices)
     held = np.zeros(n, bool)
     held[loop] = True
@@ -82,9 +92,13 @@ def conformal(surface):
 
     direction = np.cumsum(np.pi - angle_sum[loop] + flux[loop])  # of the side that follows each vertex
     along = np.column_stack([np.cos(direction), np.sin(direction)])
-    length = edge_lengths(surface.vertices[loop])
-    # Close the outline by the least change of its lengths
-    length -= length * (along @ np.linalg.lstsq(along.T @ (length[:, None] * along), length @ along, rcond=None)[0])
+    following = np.concatenate([np.roll(outline, -1) for outline in outlines])
+    length = np.linalg.norm(surface.vertices[following] - surface.vertices[loop], axis=1)
+    # Close every outline by the least change of its lengths.
+    gap = np.add.reduceat(length[:, None] * along, starts)
+    stiffness = np.add.reduceat(length[:, None, None] * along[:, :, None] * along[:, None], starts)
+    change = (np.linalg.pinv(stiffness) @ gap[:, :, None])[solid.vertex_piece[loop], :, 0]
+    length = length * (1 - (along * change).sum(axis=1))
     outline = np.zeros((n, 2))
-    outline[np.roll(loop, -1)] = np.cumsum(length[:, None] * along, axis=0)
+    outline[following] = np.cumsum(length[:, None] * along, axis=0)  # closed, they end where the next one begins
     return solve(outline)[: len(surface.vertices)]

@@ -122,6 +122,12 @@ class Dirichlet:
         return result
 
 
+def banded(n, edges):
+    """An elimination order (n,) that suits a small graph, or many of them: neighbours come soon after one another."""
+    graph = coo_array((np.ones(len(edges), np.int8), tuple(edges.T)), shape=(n, n))
+    return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
+
+
 def nested_dissection(points, edges):
     """An elimination order (n,) with little fill, by recursive bisection of `points` (n, d).
 
@@ -130,8 +136,7 @@ def nested_dissection(points, edges):
     """
     n, axes = points.shape
     if len(edges) and n <= _FEW:
-        graph = coo_array((np.ones(len(edges), np.int8), tuple(edges.T)), shape=(n, n))
-        return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
+        return banded(n, edges)
     piece = np.zeros(n, dtype=np.int64)  # -1 once in a separator
     key = np.zeros(n, dtype=np.int64)  # one base-3 digit a level: first half 0, second half 1, separator 2
     orders = [np.argsort(points[:, axis], kind="stable") for axis in range(axes)]

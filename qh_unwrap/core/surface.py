@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from . import errors
-from .solver import nested_dissection
+from .solver import banded, nested_dissection
 
 # A triangle lower than this part of its longest edge has no area, for all that single precision can tell.
 _FLATTEST = 1e-6
@@ -18,16 +18,18 @@ _THICKENED = 1e-2
 
 
 class Surface:
-    """A connected, orientable, manifold triangle surface of genus 0 with at least one boundary loop.
+    """A connected, orientable, manifold triangle surface of genus 0 with at least one boundary loop; or several.
 
     Parameters
     ----------
     vertices : (n, 3) floats, any unit
     triangles : (m, 3) integers, consistently wound
+    vertex_starts, triangle_starts : (p,) where the vertices and the triangles of each piece begin
 
     Attributes
     ----------
-    vertices : (n, 3), the input, moved and scaled so that its area is 1
+    vertices : (n, 3), the input, every piece moved and scaled so that its area is 1
+    vertex_piece : (n,), piece : (m,), the piece that a vertex and a triangle belongs to, 0 if there is only one
     triangles : (m, 3)
     edges : (k, 2), each edge once, smaller index first
     triangle_edges : (m, 3), the edge from corner c to corner c + 1
@@ -41,11 +43,14 @@ class Surface:
     Raises a subclass of `SurfaceError`, one for each cause.
     """
 
-    def __init__(self, vertices, triangles):
+    def __init__(self, vertices, triangles, vertex_starts=(0,), triangle_starts=(0,)):
         vertices, triangles = _checked_arrays(vertices, triangles)
         self.triangles = triangles
+        self.vertex_starts, self.triangle_starts = np.asarray(vertex_starts), np.asarray(triangle_starts)
+        self.vertex_piece = _numbered(self.vertex_starts, len(vertices))
+        self.piece = _numbered(self.triangle_starts, len(triangles))
         self._check_triangles(len(vertices))
-        self.vertices = _normalised(vertices, triangles)
+        self._normalise(vertices)
         self._check_edges()
         self._check_vertices()
         self.loops = self._boundary_loops()
@@ -53,6 +58,23 @@ class Surface:
         self.flat, self.degenerate = _isometric_corners(self.vertices[triangles])
         self.area = signed_areas(self.flat)
         self.air = np.zeros(len(triangles), bool)
+
+    def sums(self, values):
+        """Of values (m,) at triangles over each piece, (p,)."""
+        return np.add.reduceat(values, self.triangle_starts)
+
+    def _normalise(self, vertices):
+        count = np.diff(self.vertex_starts, append=len(vertices))
+        middle = np.add.reduceat(vertices, self.vertex_starts) / count[:, None]
+        centred = vertices - middle[self.vertex_piece]
+        extent = np.maximum.reduceat(np.abs(centred).max(axis=1), self.vertex_starts)
+        centred /= np.where(extent > 0, extent, 1)[self.vertex_piece, None]
+        a, b, c = np.moveaxis(centred[self.triangles], 1, 0)
+        area = self.sums(np.linalg.norm(np.cross(b - a, c - a), axis=1)) / 2
+        if not (area > 1e-14).all():
+            wrong = np.flatnonzero((area <= 1e-14)[self.piece])
+            raise errors.DegenerateError("all its faces have zero area: there is nothing to unwrap", wrong)
+        self.vertices = centred / np.sqrt(area)[self.vertex_piece, None]
 
     def _check_triangles(self, n):
         triangles = self.triangles
@@ -117,15 +139,19 @@ class Surface:
             )
 
     def _check_topology(self):
-        n, m = len(self.vertices), len(self.triangles)
+        n, p = len(self.vertices), len(self.vertex_starts)
         a, b = self.edges.T
         graph = coo_array((np.ones(len(a), bool), (a, b)), shape=(n, n))
-        pieces = connected_components(graph, directed=False)[0]
-        if pieces > 1:
-            raise errors.DisconnectedError(f"it has {pieces} separate pieces: unwrap each on its own")
-        if not self.loops:
+        found, label = connected_components(graph, directed=False)
+        if found != p or len(np.unique(label * p + self.vertex_piece)) > p:
+            raise errors.DisconnectedError(f"it has {found} separate pieces: unwrap each on its own")
+        loops, vertices, edges, triangles = (
+            np.bincount(self.vertex_piece[of], minlength=p)
+            for of in ([loop[0] for loop in self.loops], np.arange(n), a, self.triangles[:, 0])
+        )
+        if not loops.all():
             raise errors.ClosedError("it is closed: mark a seam to cut it open")
-        handles = (2 - len(self.loops) - (n - len(self.edges) + m)) // 2
+        handles = ((2 - loops - (vertices - edges + triangles)) // 2).max()
         if handles:
             raise errors.GenusError(
                 f"it has {handles} {'handle' if handles == 1 else 'handles'}, like a torus: mark seams to cut it open"
@@ -160,7 +186,10 @@ class Surface:
                 loop.append(vertex)
                 vertex = following.pop(vertex)
             # Start at the smallest index: the loop does not depend on the order of the triangles.
-            loops.append(np.roll(loop, -int(np.argmin(loop))))
+            least = loop.index(min(loop))
+            loops.append(np.array(loop[least:] + loop[:least]))
+        if len(loops) == len(self.vertex_starts):
+            return sorted(loops, key=lambda loop: loop[0])  # one for each piece
         return sorted(loops, key=lambda loop: (-round(perimeter(self.vertices[loop]), 12), loop[0]))
 
     @cached_property
@@ -171,6 +200,8 @@ class Surface:
     @cached_property
     def order(self):
         """The order in which systems on the surface eliminate its vertices, (n,)."""
+        if len(self.vertex_starts) > 1:
+            return banded(len(self.vertices), self.edges)
         return nested_dissection(self.vertices, self.edges)
 
     @cached_property
@@ -185,7 +216,7 @@ class Surface:
 
         With `air` the fans belong to the plane, and take whatever shape the layout gives them.
         """
-        holes = self.loops[1:]
+        holes = self.loops[len(self.vertex_starts) :]
         if not holes:
             return self
         n = len(self.vertices)
@@ -206,6 +237,7 @@ class Surface:
         wider.hats = np.concatenate([self.hats, hat_gradients(some_shape)], axis=2)
         wider.area, wider.degenerate = (np.pad(each, (0, len(triangles))) for each in (self.area, self.degenerate))
         wider.air = np.pad(self.air, (0, len(triangles)), constant_values=True)
+        wider.vertex_piece, wider.piece = (np.zeros(len(each), np.int64) for each in (uv, wider.triangles))
         wider.order = nested_dissection(uv, wider.edges)
         del wider.loops, wider.on_boundary  # those of the surface alone
         return wider
@@ -240,16 +272,8 @@ def _checked_arrays(vertices, triangles):
     return vertices, triangles
 
 
-def _normalised(vertices, triangles):
-    centred = vertices - vertices.mean(axis=0)
-    extent = np.abs(centred).max()
-    if extent > 0:
-        centred /= extent
-        a, b, c = np.moveaxis(centred[triangles], 1, 0)
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-        if area > 1e-14:
-            return centred / np.sqrt(area)
-    raise errors.DegenerateError("all its faces have zero area: there is nothing to unwrap", np.arange(len(triangles)))
+def _numbered(starts, count):
+    return np.repeat(np.arange(len(starts)), np.diff(starts, append=count))
 
 
 def _isometric_corners(corners):

@@ -28,10 +28,14 @@ def jacobian_of(corners, hats, uv):
 
 
 def area_scale(surface, jacobian):
-    """The layout's area by the surface's, never zero; dividing squared stretches by it makes them free of scale."""
+    """The layout's area by the surface's (m,), that of the piece of each triangle; never zero.
+
+    Dividing squared stretches by it makes them free of scale.
+    """
     (a, b), (c, d) = jacobian
     area = np.where(surface.air, 0, surface.area)
-    return max(abs(area @ (a * d - b * c)) / area.sum(), 1e-300)
+    scale = np.abs(surface.sums(area * (a * d - b * c))) / surface.sums(area)
+    return np.maximum(scale, 1e-300)[surface.piece]
 
 
 def squared_stretches(surface, uv, side="right", smallest=_SMALLEST):

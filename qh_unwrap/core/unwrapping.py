@@ -18,7 +18,7 @@ from .surface import Surface
 from .validity import enclosed_area, invalid, is_injective
 
 _HANDOVER = 0.9  # an iteration that lowers the energy by less than this part of it gives way to the refinement
-_ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
+ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
 # The starts to choose from, the cheapest first, and the energy that needs no further one
 _STARTS = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "MEAN_VALUE": np.inf}
 
@@ -123,8 +123,6 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
         yield replace(state, uv=state.uv[:n] * mirror)
     chosen = placed(uv[:n])
 
-    if surface.degenerate.any():
-        warnings += (f"{surface.degenerate.sum()} faces have zero area",)
     report = Report(
         before=None if given is None else measure(surface, given),
         initial=measure(surface, start[:n]),
@@ -134,9 +132,14 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
         changes=tuple(changes),
         injective=is_injective(chosen, surface.triangles, surface.loops),
         mirrored=bool(mirrored),
-        warnings=warnings,
+        warnings=warnings + face_warnings(int(surface.degenerate.sum())),
     )
     return Result(chosen * mirror, report)
+
+
+def face_warnings(flat):
+    """What to say of so many faces without area."""
+    return (f"{flat} {'face has' if flat == 1 else 'faces have'} zero area",) if flat else ()
 
 
 def _improved(surface, domain, settings, start, placed):
@@ -154,7 +157,7 @@ def _improved(surface, domain, settings, start, placed):
         uneven = state.repaired or refining or settings.boundary == "FREE"
         if state.valid and not invalid(surface, placed(state.uv[:n])).any():
             value = energy(surface, state.uv[:n], settings.balance) if uneven else np.inf
-            if refining and value <= _ISOMETRIC:
+            if refining and value <= ISOMETRIC:
                 return state.uv, True
             enough = refining and state.iteration and value > (1 - _HANDOVER) * least
             if best is None or not uneven or value < least:
@@ -172,10 +175,10 @@ def _improved(surface, domain, settings, start, placed):
         for number, (refined, done) in enumerate(steps, start=last.iteration + 1):
             change = float(np.linalg.norm(refined[:n] - previous, axis=1).max() / diameter(refined[:n]))
             valid = not invalid(surface, placed(refined[:n])).any()
-            yield State(number, refined, change, valid, done, state.repaired)
+            yield State(number, refined, change, valid, bool(done.all()), state.repaired)
             previous = refined[:n]
             if valid:
-                uv, converged = refined, done
+                uv, converged = refined, bool(done.all())
     return uv, converged
 
 
@@ -220,7 +223,7 @@ def _free(surface, settings, uv, pinned, triangulate):
         start = _natural_start(surface, settings, settings.initial, uv)
     if pinned.any():
         start = np.where(pinned[:, None], uv, fit(start, pinned, uv))
-    if not settings.iterations or (settings.refine and energy(surface, start, settings.balance) <= _ISOMETRIC):
+    if not settings.iterations or (settings.refine and energy(surface, start, settings.balance) <= ISOMETRIC):
         return exterior, start, warnings  # which need no air
     with_air = exterior.renewed(start)
     if with_air is None:

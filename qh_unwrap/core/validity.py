@@ -71,10 +71,20 @@ def is_injective(uv, triangles, loops):
     """
     if (orientation(uv, triangles) <= 0).any():
         return False
-    polygons = [as_stored(uv)[loop] for loop in loops]
+    stored = as_stored(uv)
+    polygons = [stored[loop] for loop in loops]
     # Triangles of positive area leave the outer loop counter-clockwise and the others clockwise, if all are simple.
     turns_left = [enclosed_area(polygon) > 0 for polygon in polygons]
     return sum(turns_left) == 1 and count_crossings(polygons, touching=True) == 0
+
+
+def are_injective(uv, surface):
+    """The same for every piece of a surface whose pieces have one boundary loop each, (p,) bool."""
+    wrong = surface.sums((orientation(uv, surface.triangles) <= 0).astype(int)) > 0
+    stored = as_stored(uv)
+    polygons = [stored[loop] for loop in surface.loops]
+    wrong |= crossings(polygons, np.arange(len(polygons)), touching=True) > 0
+    return ~wrong
 
 
 def enclosed_area(points):
@@ -85,36 +95,46 @@ def enclosed_area(points):
 
 def count_crossings(polygons, touching=False):
     """How many pairs of sides of the closed polygons, each (n, 2), properly cross, or also touch, exactly."""
-    start = np.concatenate(polygons)
-    end = np.concatenate([np.roll(points, -1, axis=0) for points in polygons])
-    first_side = np.repeat(np.cumsum([0, *map(len, polygons[:-1])]), [len(points) for points in polygons])
-    last_side = first_side + np.repeat([len(points) - 1 for points in polygons], [len(points) for points in polygons])
-    number = np.arange(len(start))
-    following = np.where(number == last_side, first_side, number + 1)
+    return int(crossings(polygons, np.zeros(len(polygons), int), touching)[0])
 
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    crossings = 0
-    for one, other in _near_sides(low, high):
+
+def crossings(polygons, group, touching=False):
+    """The same within every group of polygons; `group` (k,) numbers that of each polygon."""
+    start = np.concatenate(polygons)
+    sizes = np.array([len(points) for points in polygons])
+    first = np.cumsum(sizes) - sizes
+    number = np.arange(len(start))
+    following = number + 1
+    following[first + sizes - 1] = first
+    end = start[following]
+    group = np.repeat(group, sizes)
+
+    found = np.zeros(group.max() + 1, int)
+    for one, other in _near_sides(np.minimum(start, end), np.maximum(start, end), group):
         a, b, c, d = start[one], end[one], start[other], end[other]
         across, back = turn(a, b, c) * turn(a, b, d), turn(c, d, a) * turn(c, d, b)
-        if not touching:
-            crossings += int(np.sum((across < 0) & (back < 0)))
-            continue
-        neighbours = (following[one] == other) | (following[other] == one)
-        crossings += int(np.sum((across <= 0) & (back <= 0) & ~neighbours))
+        if touching:
+            neighbours = (following[one] == other) | (following[other] == one)
+            crossing = (across <= 0) & (back <= 0) & ~neighbours
+        else:
+            crossing = (across < 0) & (back < 0)
+        found += np.bincount(group[one[crossing]], minlength=len(found))
     if touching:  # and sides that turn back on the one before
-        back = start[following] - start, end[following] - start[following]
+        back = end - start, end[following] - end
         on_a_line = turn(start, end, end[following]) == 0
-        crossings += int(np.sum(on_a_line & ((back[0] * back[1]).sum(axis=1) <= 0)))
-    return crossings
+        found += np.bincount(group[on_a_line & ((back[0] * back[1]).sum(axis=1) <= 0)], minlength=len(found))
+    return found
 
 
-def _near_sides(low, high):
-    """The pairs of sides with the boxes from `low` to `high` (n, 2) that meet, a portion at a time."""
+def _near_sides(low, high, group):
+    """The pairs of sides of one group with the boxes from `low` to `high` (n, 2) that meet, a portion at a time."""
     axis = int(np.argmax(np.ptp(low, axis=0)))
-    order = np.argsort(low[:, axis], kind="stable")
+    # Laid end to end, the groups lie apart by more than rounding can close.
+    apart = 2 * (np.ptp(np.vstack([low, high])[:, axis]) + 1e-30)
+    begin, close = low[:, axis] + apart * group, high[:, axis] + apart * (group + 1e-9)
+    order = np.argsort(begin, kind="stable")
     # Sides sorted by where they begin: each is near its followers as long as those begin before it ends.
-    count = np.searchsorted(low[order, axis], high[order, axis], side="right") - np.arange(len(order)) - 1
+    count = np.searchsorted(begin[order], close[order], side="right") - np.arange(len(order)) - 1
     for part in np.array_split(np.arange(len(order)), 1 + count.sum() // _PORTION):
         total = np.cumsum(count[part])
         one = np.repeat(part, count[part])

