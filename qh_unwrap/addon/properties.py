@@ -65,7 +65,7 @@ class OperatorProperties(SettingsProperties):
 
 
 _SECTIONS = {
-    "Layout": ('placement', 'margin_method', 'margin'),
+    "Layout": ('placement', 'rotate', 'margin_method', 'margin'),
     "Mesh": ('fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data'),
     "Advanced": ('refine', 'tolerance', 'initial', 'repair', 'tensor_power'),
 }
@@ -100,6 +100,7 @@ def _applies(owner, name):
         'repair': owner.weights == 'COTANGENT',
         'fill_holes': owner.boundary not in ('KEEP', 'FREE'),
         'placement': placed,
+        'rotate': placed and owner.placement == 'PACK',
         'margin': placed and owner.placement != 'UNIT',
         'margin_method': placed and owner.placement != 'UNIT',
     }.get(name, True)

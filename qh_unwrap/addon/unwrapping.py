@@ -12,7 +12,7 @@ from ..core import Settings, UnwrapError, distortion, unwrap_steps
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import Island, attached, find_islands
 from ..core.validity import orientation
-from . import memory, mesh_arrays, placing
+from . import memory, mesh_arrays, packing, placing
 from .delaunay import triangulate
 from .outcome import Outcome, count
 from .overlaps import overlap, overlapping
@@ -191,12 +191,14 @@ def _place(works, all_works, options, context):
             work.uv = work.uv * (-1, 1)
         if options.placement == 'UNIT':
             work.uv = placing.in_unit_square(work.uv / work.aspect) * work.aspect
-        elif options.placement == 'PACK':
-            packed.append(work)
-        elif old is not None:
+            continue
+        if old is not None:
             work.uv = placing.in_place(work.uv, work.triangles, old)
         else:
             work.uv = placing.upright(work.uv, work.vertices, work.triangles, work.mesh.up)
+        if options.placement == 'PACK':
+            packed.append(work)
+        elif old is None:
             new.append(work)
     _pack(packed, options, True, context)
     if new:
@@ -207,12 +209,14 @@ def _place(works, all_works, options, context):
                 work.uv = work.uv + (tile, 0) * work.aspect
 
 
-def _pack(works, options, tight, context):
-    if not works:
-        return
+def _pack(works, options, nested, context):
+    works = sorted(works, key=lambda work: work.aspect[0])
+    groups = {
+        aspect: [(work.vertices, work.triangles, work.uv) for work in group]
+        for aspect, group in itertools.groupby(works, key=lambda work: work.aspect[0])
+    }
     try:
-        islands = [(work.vertices, work.triangles, work.uv) for work in works]
-        packed = placing.pack(islands, options, tight, context)
+        packed = packing.pack(groups, options, nested, context) if works else []
     except UnwrapError as error:
         packed = [None] * len(works)
         for work in works:
