@@ -5,7 +5,7 @@ import bpy
 
 from ..core.errors import SettingsError
 from . import properties, selection
-from .outcome import summary
+from .outcome import sentences, summary
 from .unwrapping import unwrap_targets
 
 last_outcomes = []  # of the latest run, for the panels
@@ -47,9 +47,8 @@ class QH_OT_unwrap(properties.OperatorProperties, bpy.types.Operator):
             return {'CANCELLED'}
         outcomes = _with_progress(context.window_manager, unwrap_targets(targets, settings, options, context))
         last_outcomes[:] = outcomes
-        for outcome in outcomes:
-            for warning in outcome.warnings:
-                self.report({'INFO'}, f"{outcome.label}: {warning}")
+        for sentence in sentences(outcomes):
+            self.report({'INFO'}, sentence)
         failed = sum(bool(outcome.error) for outcome in outcomes)
         if failed == len(outcomes):
             self.report({'ERROR'}, summary(outcomes))

@@ -11,11 +11,11 @@ import numpy as np
 from ..core import Settings, UnwrapError, distortion, unwrap_steps
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import Island, attached, find_islands
-from ..core.validity import orientation
+from ..core.validity import as_stored, orientation
 from . import memory, mesh_arrays, packing, placing
 from .delaunay import triangulate
 from .outcome import Outcome, count
-from .overlaps import overlap, overlapping
+from .overlaps import certified, overlap, overlapping
 from .selection import Target
 
 
@@ -77,6 +77,13 @@ class _Work:
         return uv
 
     @property
+    def stored_uv(self):
+        """(n, 2) the new UVs in Blender's single precision, as seen from the side where they are not mirrored."""
+        uv = np.empty_like(self.uv)
+        uv[self.island.corner_vertex] = as_stored(self.corner_uv)
+        return uv * (-1, 1) if self.mirrored else uv
+
+    @property
     def is_cut(self):
         """Whether the old UVs have cuts where there is no seam."""
         gap = self.old_uv[self.island.corner_vertex] - self.mesh.uv[self.island.corners] * self.aspect
@@ -132,8 +139,10 @@ def _works(target, settings, options):
     hanging = np.zeros(len(mesh.corner_vertex), dtype=bool)
     if stays_attached and mesh.uv is not None:
         hanging = attached(*topology, mesh.uv)
-    for number, island in enumerate(find_islands(*topology, mesh.corner_triangles), start=1):
-        yield _Work(target, mesh, island, Outcome(obj.name, number, len(island.faces)), settings, hanging)
+    islands = find_islands(*topology, mesh.corner_triangles)
+    for number, island in enumerate(islands, start=1):
+        outcome = Outcome(obj.name, number, len(island.faces), alone=len(islands) == 1)
+        yield _Work(target, mesh, island, outcome, settings, hanging)
 
 
 def _unwrap(work):
@@ -151,8 +160,6 @@ def _unwrap(work):
     work.outcome.iterations = result.report.iterations
     work.outcome.converged = result.report.converged
     work.outcome.warnings += tuple(result.report.warnings)
-    if not (result.report.injective or result.report.after.flips or result.report.after.collapsed):
-        work.outcome.warnings += ("it overlaps itself",)
     if work.island.crowded_edges:
         edges = count(work.island.crowded_edges, "edge")
         work.outcome.warnings += (f"it ends at {edges} where more than two faces meet",)
@@ -260,14 +267,9 @@ def _report_overlaps(works, all_works):
         before.append(rest)
     for i, j in overlapping(now):
         if before[i] is None or before[j] is None or not overlap(before[i], before[j]):
-            for one, other in ((i, j), (j, i)):
-                if one < len(works):
-                    works[one].outcome.overlaps += (names[other],)
-    for work in works:
-        if work.outcome.overlaps:
-            first, *more = work.outcome.overlaps
-            others = f" and {len(more)} more" if more else ""
-            work.outcome.warnings += (f"it lies on {first}{others} now: pack them together",)
+            works[i].outcome.overlaps += (names[j],)
+            if j < len(works):
+                works[j].outcome.overlaps += (names[i],)
 
 
 def _write(obj, works):
@@ -280,13 +282,13 @@ def _write(obj, works):
             work.outcome.error = str(error)
         return
     for work in works:
-        work.outcome.after = _as_stored(work)
         work.outcome.area = placing.area(work.vertices, work.triangles)
+        _judge(work)
 
 
-def _as_stored(work):
-    """The distortion of the UVs that Blender stores: the core's, unless rounding turned faces where they lie now."""
-    seen = work.uv * (-1, 1) if work.mirrored else work.uv
-    if np.array_equal(orientation(seen, work.triangles), work.outcome.after.triangle_orientation):
-        return work.outcome.after
-    return distortion(work.vertices, work.triangles, seen)
+def _judge(work):
+    """Say what there is to say of the UVs that Blender stores, which are rounded where they lie now."""
+    outcome, triangles, uv = work.outcome, work.triangles, work.stored_uv
+    if not np.array_equal(orientation(uv, triangles), outcome.after.triangle_orientation):
+        outcome.after = distortion(work.vertices, triangles, uv * work.aspect)
+    outcome.injective = not (outcome.after.flips or outcome.after.collapsed) and certified(uv, triangles)

@@ -2,10 +2,11 @@
 import bpy
 import numpy as np
 import pytest
-from scenes import add_grid, edit_mode, uvs
+from scenes import add_grid, edit_mode, mesh_object, uvs
 from scipy.spatial import Delaunay
 
 from qh_unwrap.addon import operators, placing
+from qh_unwrap.addon.outcome import sentences, summary
 
 
 def set_uvs(obj, values):
@@ -238,7 +239,8 @@ def test_overlap_with_another_island_is_reported_and_named():
         bpy.ops.uv.qh_unwrap(**options)
         one, other = operators.last_outcomes
         assert (one.overlaps, other.overlaps) == (((other.label,), (one.label,)) if expected else ((), ())), options
-        assert any("pack them together" in text for text in one.warnings) == expected
+        told = [text for text in sentences(operators.last_outcomes) if "pack them together" in text]
+        assert told == ([f"{one.label} lies on {other.label} now: pack them together"] if expected else []), "once"
 
 
 def test_stacked_islands_stay_stacked_without_a_warning():
@@ -246,6 +248,26 @@ def test_stacked_islands_stay_stacked_without_a_warning():
     set_uvs(obj, [(abs(vertex.co.x) / 2, vertex.co.y / 2) for vertex in corner_vertices(obj)])
     bpy.ops.uv.qh_unwrap(boundary='CIRCLE')
     assert [outcome.overlaps for outcome in operators.last_outcomes] == [(), ()]
+
+
+@pytest.mark.parametrize(("shift", "expected"), [(0, True), (4096, False), (-4096, False)])
+@pytest.mark.parametrize("options", [{}, {"boundary": 'KEEP'}])
+def test_certificate_counts_where_the_island_lies(options, shift, expected):
+    """A tongs whose arms almost touch: far from the origin, 32-bit floats cannot tell them apart."""
+    half_gaps = np.linspace(0.2, 2e-5, 6)
+    points = [(u, 0.4 * row) for row, half in enumerate(half_gaps) for u in (0, 0.7 - half, 0.7 + half, 1.4)]
+    faces = [(4 * row + k, 4 * row + k + 1, 4 * row + k + 5, 4 * row + k + 4) for row in range(5) for k in (0, 2)]
+    faces.append((1, 2, 6, 5))
+    obj = mesh_object("Tongs", [(u, v, 0) for u, v in points], faces)
+    obj.data.uv_layers.new()
+    set_uvs(obj, [(points[loop.vertex_index][0] + shift, points[loop.vertex_index][1]) for loop in obj.data.loops])
+    bpy.ops.uv.qh_unwrap(**options)
+    (outcome,) = operators.last_outcomes
+    assert (outcome.after.flips, outcome.after.collapsed) == (0, 0)
+    assert (outcome.injective, outcome.is_clean) == (expected, expected)
+    told = list(sentences([outcome]))
+    assert told == ([] if expected else ["Tongs (11 faces) overlaps itself"])
+    assert summary([outcome]).endswith("no flips" if expected else "no flips; 1 on top of itself")
 
 
 def corner_vertices(obj):
