@@ -18,6 +18,9 @@ from .outcome import Outcome, count
 from .overlaps import certified, overlap, overlapping
 from .selection import Target
 
+_FIXED = 300  # vertices that take as long as what an island takes whatever its size
+_LEFT = 0.9  # of an island after each iteration, by and large
+
 
 @dataclass
 class _Work:
@@ -104,22 +107,29 @@ class _Work:
 
 
 def unwrap_targets(targets, settings, options, context):
-    """Unwrap the targets' faces.  A generator: yields (iterations done, iterations at most), returns the outcomes.
+    """Unwrap the targets' faces.  A generator: yields the share that is done, returns the outcomes.
 
     An island that fails is left as it was, and its outcome says why; nothing is written before all are done.
     """
-    works = [work for target in targets for work in _works(target, settings, options)]
-    rounds = settings.iterations + 1
-    for done, work in enumerate(works):
-        yield done * rounds, len(works) * rounds
+    works = []
+    for target in targets:
+        yield 0.0
+        works += _works(target, settings, options)
+    sizes = np.array([_FIXED + len(work.island.vertices) for work in works])
+    for done, size, work in zip(np.cumsum(sizes) - sizes, sizes, works, strict=True):
         try:
-            steps = _unwrap(work)
-            for iteration in steps:
-                yield done * rounds + iteration, len(works) * rounds
+            yield done / sizes.sum()
+            for iteration in _unwrap(work):
+                yield (done + size * (1 - _LEFT**iteration)) / sizes.sum()
         except UnwrapError as error:
             work.outcome.error = str(error)
         except MemoryError:
             work.outcome.error = "the memory ran out: mark seams to cut it into smaller islands"
+    yield 1.0
+    if not all(mesh_arrays.is_as_read(work.target.obj, work.mesh) for work in works):
+        for work in works:
+            work.outcome.error = "a mesh was changed meanwhile: unwrap again"
+        return [work.outcome for work in works]
 
     _place([work for work in works if work.uv is not None], works, options, context)
     placed = [work for work in works if work.uv is not None]
