@@ -4,7 +4,7 @@
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-_STEEPEST_FLAT = 0.5  # an island that climbs less than this, by the way along it, has no upper end
+_STEEPEST_FLAT = 0.25  # an island that climbs less than this, by the way along it, has no upper end
 
 
 def says_where(corners):

@@ -171,6 +171,29 @@ def test_first_unwrap_is_upright(boundary, rotation):
     assert area_and_centre(obj)[0] > 0, "and not mirrored"
 
 
+@pytest.mark.parametrize("boundary", ['FREE', 'CIRCLE', 'RECTANGLE'])
+def test_first_unwrap_of_a_head_is_upright(boundary):
+    """Most of what goes up on one side comes down on the other, and yet it has an upper end."""
+    bpy.ops.mesh.primitive_monkey_add(calc_uvs=False)
+    obj = bpy.context.object
+    for edge in obj.data.edges:
+        one, other = (obj.data.vertices[index].co for index in edge.vertices)
+        edge.use_seam = abs(one.x) + abs(other.x) < 1e-4 and one.y + other.y > -0.5
+    bpy.ops.uv.qh_unwrap(boundary=boundary)
+    head = max(operators.last_outcomes, key=lambda outcome: outcome.faces)
+    assert head.faces == 436 and not head.error
+    vertices = np.array([loop.vertex_index for loop in obj.data.loops])
+    (top, *_), (chin, *_) = (uvs(obj)[vertices == vertex] for vertex in _forehead_and_chin(obj.data))
+    _, up = (top - chin) / np.linalg.norm(top - chin)
+    assert up > 0.95
+
+
+def _forehead_and_chin(mesh):
+    """Vertices in the middle of the face."""
+    middle = [vertex for vertex in mesh.vertices if abs(vertex.co.x) < 1e-4 and vertex.co.y < -0.3]
+    return (pick(middle, key=lambda vertex: vertex.co.z).index for pick in (max, min))
+
+
 @pytest.mark.parametrize("rotate", [True, False])
 def test_packing_turns_islands_only_when_told_to(rotate):
     """Of walls half of which are tall and half wide, which fit the square better if all are the same."""
