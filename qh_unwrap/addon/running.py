@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Long work that stays in hand: scripts get it done at once, people see how far it is and can cancel it with ESC."""
 
+import traceback
 from time import perf_counter
 
 _AT_ONCE = 0.5  # seconds: what takes no longer ends before anyone could look
@@ -78,9 +79,11 @@ class InSteps:
             return {'RUNNING_MODAL'}
         try:
             finished = self._run.advance(_SLICE)
-        except BaseException:
+        except Exception as error:  # Blender would take it for finished, and make a step to undo
             self._end(context)
-            raise
+            traceback.print_exc()
+            self.report({'ERROR'}, f"{type(error).__name__}: {error}")
+            return {'CANCELLED'}
         if not finished:
             self._show(context)
             return {'RUNNING_MODAL'}

@@ -241,27 +241,27 @@ def test_swallows_everything_else(slow):
 
 
 @pytest.mark.parametrize("start", ["execute", "invoke"])
-def test_exception_leaves_nothing_behind(slow, monkeypatch, start):
+def test_exception_leaves_nothing_behind(slow, monkeypatch, start, capsys):
     objects = scene()
     before = everything(objects)
 
     def steps(*_arguments, **_keywords):
         yield SimpleNamespace(iteration=1)
         yield SimpleNamespace(iteration=2)
-        raise ZeroDivisionError
+        raise ZeroDivisionError("by zero")
 
     monkeypatch.setattr(unwrapping, "unwrap_steps", steps)
-    operator, context = Unwrapping(), Context()
-
-    def run():
-        if start == "execute":
+    if start == "execute":
+        operator, context = Unwrapping(), Context()
+        with pytest.raises(ZeroDivisionError):
             operator.execute(context)
-        operator.invoke(context, None)
-        while True:
-            operator.modal(context, TIMER)
-
-    with pytest.raises(ZeroDivisionError):
-        run()
+    else:
+        operator, context = begun()
+        while (result := operator.modal(context, TIMER)) == {'RUNNING_MODAL'}:
+            pass
+        assert result == {'CANCELLED'}
+        assert operator.reports == [({'ERROR'}, "ZeroDivisionError: by zero")]
+        assert "Traceback" in capsys.readouterr().err
     assert context.window.is_clean and operator._run is None
     assert everything(objects) == before
 
