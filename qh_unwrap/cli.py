@@ -98,7 +98,7 @@ def _run(args):
     targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
     with files.quiet():
         outcomes = _drain(unwrapping.unwrap_targets(targets, settings, options, bpy.context))
-    _print_table(outcomes, outcome.change)
+    _print_table(outcomes, outcome.sentences(outcomes), outcome.change)
 
     done = [outcome for outcome in outcomes if not outcome.error]
     if args.output and done:
@@ -167,18 +167,18 @@ def _drain(steps):
             return stop.value
 
 
-def _print_table(outcomes, change):
+def _print_table(outcomes, sentences, change):
     head = ("island", "faces", "stretch", "sym. Dirichlet", "angle", "area", "flips", "iterations")
     rows = [_row(outcome, change) for outcome in outcomes if not outcome.error]
     widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
     for row in (head, *rows) if rows else ():
         first, *others = (text.rjust(width) for text, width in zip(row, widths, strict=True))
         print("  ".join((first.strip().ljust(widths[0]), *others)))
+    for sentence in sentences:
+        print(sentence)
     for outcome in outcomes:
-        for warning in outcome.warnings:
-            print(f"{outcome.label}: {warning}")
         if outcome.error:
-            print(f"{outcome.label}: {outcome.error}", file=sys.stderr)
+            print(outcome.sentence(outcome.error), file=sys.stderr)
 
 
 def _row(outcome, change):

@@ -41,6 +41,16 @@ def read(obj, options=None):
         bpy.data.meshes.remove(copy)
 
 
+def is_as_read(obj, arrays):
+    """Whether the object is still there with the mesh that was read: another window may have been used meanwhile."""
+    try:
+        mesh = obj.data if obj.mode != 'EDIT' else bmesh.from_edit_mesh(obj.data)
+    except ReferenceError:
+        return False
+    now = (mesh.verts, mesh.edges, mesh.faces) if obj.mode == 'EDIT' else (mesh.vertices, mesh.edges, mesh.polygons)
+    return [len(each) for each in now] == [len(arrays.vertices), len(arrays.seam), len(arrays.face_start)]
+
+
 def _read(obj, mesh, uv_name, options):
     mesh.calc_loop_triangles()
     vertices = _get(mesh.vertices, "co", np.float32, 3)

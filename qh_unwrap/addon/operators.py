@@ -5,13 +5,14 @@ import bpy
 
 from ..core.errors import SettingsError
 from . import properties, selection
-from .outcome import summary
+from .outcome import sentences, summary
+from .running import InSteps
 from .unwrapping import unwrap_targets
 
 last_outcomes = []  # of the latest run, for the panels
 
 
-class QH_OT_unwrap(properties.OperatorProperties, bpy.types.Operator):
+class QH_OT_unwrap(InSteps, properties.OperatorProperties, bpy.types.Operator):
     """Unwrap the selected faces, in Object Mode all faces, with little distortion and without flipping any"""
 
     bl_idname = "uv.qh_unwrap"
@@ -30,26 +31,27 @@ class QH_OT_unwrap(properties.OperatorProperties, bpy.types.Operator):
     def draw(self, _context):
         properties.draw(self.layout, self)
 
-    def invoke(self, context, _event):
+    def invoke(self, context, event):
         """From a menu: with the panel's settings.  Scripts come to `execute`, with the defaults."""
         self.take_unset_from(context.scene.qh_unwrap)
-        return self.execute(context)
+        return super().invoke(context, event)
 
-    def execute(self, context):
+    def begin(self, context):
         targets = selection.targets(context)
         if not targets:
             self.report({'ERROR'}, selection.nothing_selected(context))
-            return {'CANCELLED'}
+            return None
         try:
             settings, options = self.settings(), self.mesh_options()
         except SettingsError as error:
             self.report({'ERROR'}, str(error))
-            return {'CANCELLED'}
-        outcomes = _with_progress(context.window_manager, unwrap_targets(targets, settings, options, context))
+            return None
+        return unwrap_targets(targets, settings, options, context)
+
+    def finish(self, outcomes):
         last_outcomes[:] = outcomes
-        for outcome in outcomes:
-            for warning in outcome.warnings:
-                self.report({'INFO'}, f"{outcome.label}: {warning}")
+        for sentence in sentences(outcomes):
+            self.report({'INFO'}, sentence)
         failed = sum(bool(outcome.error) for outcome in outcomes)
         if failed == len(outcomes):
             self.report({'ERROR'}, summary(outcomes))
@@ -57,16 +59,3 @@ class QH_OT_unwrap(properties.OperatorProperties, bpy.types.Operator):
         clean = not failed and all(outcome.is_clean for outcome in outcomes)
         self.report({'INFO'} if clean else {'WARNING'}, summary(outcomes))
         return {'FINISHED'}
-
-
-def _with_progress(window_manager, steps):
-    """Run the steps to the end while the mouse pointer shows how far they are; returns what they return."""
-    window_manager.progress_begin(0, 1)
-    try:
-        while True:
-            done, total = next(steps)
-            window_manager.progress_update(done / total)
-    except StopIteration as stop:
-        return stop.value
-    finally:
-        window_manager.progress_end()

@@ -40,6 +40,7 @@ class MeshOptions:
     margin: float = setting(
         0.005, "Margin", "Space around the islands that are packed", range=(0.0, 1.0), soft_range=(0.0, 0.1)
     )
+    rotate: bool = setting(False, "Rotate", "Packing may turn islands by right angles; otherwise they stay as upright")
     correct_aspect: bool = setting(
         True, "Correct Aspect", "Make up for an image that is not square, the one in the faces' material"
     )

@@ -15,23 +15,47 @@ class Outcome:
     obj: str
     number: int
     faces: int
+    alone: bool = True  # the only one of its mesh
     area: float = 0.0
     before: Distortion | None = None
     after: Distortion | None = None  # of the UVs that Blender stores
     iterations: int = 0
     converged: bool = False
+    injective: bool = False  # certified: it covers no place twice
     overlaps: tuple[str, ...] = ()  # what it lies on since it was unwrapped
     warnings: tuple[str, ...] = ()
     error: str = ""
 
     @property
     def label(self):
-        return f"{self.obj}, island {self.number} ({count(self.faces, 'face')})"
+        """Its name: "Cube (6 faces)", with a number if the mesh has others."""
+        number = "" if self.alone else f", island {self.number}"
+        return f"{self.obj}{number} ({count(self.faces, 'face')})"
+
+    @property
+    def overlaps_itself(self):
+        """Or touches itself, though nothing is flipped."""
+        return not (self.error or self.injective or self.after.flips or self.after.collapsed)
+
+    def messages(self, known=()):
+        """Its warnings, and what it lies on, but for what is `known`."""
+        found = list(self.warnings)
+        if self.overlaps_itself:
+            found.append("it overlaps itself")
+        news = [name for name in self.overlaps if name not in known]
+        if news:
+            others = f" and {len(news) - 1} more" if news[1:] else ""
+            found.append(f"it lies on {news[0]}{others} now: pack them together")
+        return found
+
+    def sentence(self, text):
+        """One of its messages with its name: "Cube (6 faces) is closed: ..." of "it is closed: ..."."""
+        return f"{self.label} {text[3:]}" if text.startswith("it ") else f"{self.label}: {text}"
 
     @property
     def is_clean(self):
-        """Unwrapped, with nothing flipped, collapsed or on top of another."""
-        return not self.error and not (self.after.flips or self.after.collapsed or self.overlaps)
+        """Unwrapped, with nothing flipped, collapsed or on top of anything."""
+        return not self.error and self.injective and not self.overlaps
 
     def to_dict(self):
         """JSON-ready."""
@@ -43,9 +67,18 @@ class Outcome:
             after=self.after.to_dict(),
             iterations=self.iterations,
             converged=self.converged,
+            injective=self.injective,
             overlaps=list(self.overlaps),
-            warnings=list(self.warnings),
+            warnings=self.messages(),
         )
+
+
+def sentences(outcomes):
+    """All that there is to say about what was unwrapped; of two that lie on each other the former says so."""
+    known = set()
+    for outcome in outcomes:
+        yield from map(outcome.sentence, outcome.messages(known))
+        known.add(outcome.label)
 
 
 def summary(outcomes):
@@ -63,9 +96,12 @@ def summary(outcomes):
         overlapping = sum(bool(outcome.overlaps) for outcome in done)
         if overlapping:
             parts.append(f"{overlapping} on top of others")
+        themselves = sum(outcome.overlaps_itself for outcome in done)
+        if themselves:
+            parts.append(f"{themselves} on top of {'itself' if themselves == 1 else 'themselves'}")
     if failed:
         more = f" (and {len(failed) - 1} more)" if len(failed) > 1 else ""
-        first = f"{failed[0].label}: {failed[0].error}{more}"
+        first = f"{failed[0].sentence(failed[0].error)}{more}"
         parts.append(f"{len(failed)} skipped: {first}" if done else first)
     return "; ".join(parts)
 

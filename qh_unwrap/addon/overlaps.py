@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which islands lie on top of each other in the plane."""
+"""Which islands lie on top of each other in the plane, or on top of themselves."""
 
 import numpy as np
+
+from ..core.validity import is_injective, orientation
 
 _DEPTH = 1e-5  # of the size of the smaller triangle: what merely touches does not overlap
 _AT_ONCE = 1 << 20  # pairs of triangles looked at in one go
@@ -30,6 +32,24 @@ def overlap(one, other):
         if _share_area(both[first[apart]], both[second[apart]]).any():
             return True
     return False
+
+
+def certified(uv, triangles):
+    """Whether the island is certain to cover no place twice in 32-bit floats; triangles without area do not count."""
+    return is_injective(uv, triangles[orientation(uv, triangles) != 0], list(_outlines(triangles)))
+
+
+def _outlines(triangles):
+    """The boundary loops, each in the direction of its triangles' winding."""
+    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    count = triangles.max() + 1
+    alone = ~np.isin(start * count + end, end * count + start)
+    following = dict(zip(start[alone].tolist(), end[alone].tolist(), strict=True))
+    while following:
+        loop = [next(iter(following))]
+        while loop[-1] in following:
+            loop.append(following.pop(loop[-1]))
+        yield loop[1:]
 
 
 def _meets(triangles, low, high):

@@ -58,7 +58,7 @@ _WIDTH = 32  # characters
 
 def _lines(outcome):
     yield f"Stretch {change(outcome.before, outcome.after, 'l2_stretch')}, {count(outcome.after.flips, 'flip')}"
-    for warning in outcome.warnings:
+    for warning in outcome.messages():
         yield from textwrap.wrap(warning, _WIDTH)
 
 

@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Putting unwrapped islands where they belong: back in place, packed, or each into the unit square."""
+"""Putting unwrapped islands where they belong: back in place, upright, or each into the unit square."""
 
-import bpy
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from ..core import UnwrapError
-
-_STEEPEST_FLAT = 0.5  # an island that climbs less than this, by the way along it, has no upper end
+_STEEPEST_FLAT = 0.25  # an island that climbs less than this, by the way along it, has no upper end
 
 
 def says_where(corners):
@@ -88,78 +85,6 @@ def in_unit_square(uv):
     low, size = uv.min(axis=0), np.ptp(uv, axis=0)
     scale = 1 / size.max() if size.max() > 0 else 1.0
     return (uv - low) * scale + (1 - size * scale) / 2
-
-
-def pack(islands, options, tight, context):
-    """Lay islands, given as (vertices, triangles, uv), out beside one another in the unit square by Blender's packer.
-
-    They get the same texel density.  If `tight`, they are turned by right angles and nest, which may take Blender a
-    minute; else their boxes lie side by side.  Blender packs what is selected in Edit Mode, so this happens on a mesh
-    and in a scene of its own, where no one's selection is disturbed.  Raises `UnwrapError` if Blender does not.
-    """
-    mesh, corner_vertices = _soup(islands)
-    scene = bpy.data.scenes.new("QH Unwrap")
-    try:
-        obj = bpy.data.objects.new(mesh.name, mesh)
-        scene.collection.objects.link(obj)
-        view_layer = scene.view_layers[0]
-        view_layer.objects.active = obj
-        if not scene.tool_settings.use_uv_select_sync:  # set in Blender 5, where setting it changes selections
-            scene.tool_settings.use_uv_select_sync = True
-        with context.temp_override(
-            scene=scene,
-            view_layer=view_layer,
-            active_object=obj,
-            object=obj,
-            edit_object=obj,
-            area=None,  # an image editor would have the islands packed into the tile where they lie
-            region=None,
-        ):
-            bpy.ops.ptcache.bake_all(bake=False)  # forgets an ESC pressed before, at which the packer silently stops
-            bpy.ops.object.mode_set(mode='EDIT')
-            bpy.ops.mesh.select_all(action='SELECT')
-            bpy.ops.uv.average_islands_scale()
-            done = bpy.ops.uv.pack_islands(
-                udim_source='CLOSEST_UDIM',
-                rotate=tight,
-                rotate_method='CARDINAL',
-                scale=True,
-                merge_overlap=False,
-                margin_method=options.margin_method,
-                margin=options.margin,
-                pin=False,
-                shape_method='CONCAVE' if tight else 'AABB',
-            )
-            bpy.ops.object.mode_set(mode='OBJECT')
-        if done != {'FINISHED'}:
-            raise UnwrapError("Blender could not pack the islands: choose the placement Unit Square")
-        corners = np.empty(2 * len(mesh.loops), dtype=np.float32)
-        mesh.uv_layers[0].uv.foreach_get("vector", corners)
-    finally:
-        bpy.data.scenes.remove(scene)
-        bpy.data.meshes.remove(mesh)
-    packed = np.empty((sum(len(uv) for _, _, uv in islands), 2))
-    packed[corner_vertices] = corners.reshape(-1, 2)
-    return np.split(packed, np.cumsum([len(uv) for _, _, uv in islands])[:-1])
-
-
-def _soup(islands):
-    """One mesh of all the islands' triangles, and the vertex of each of its corners."""
-    first = np.cumsum([0] + [len(vertices) for vertices, _, _ in islands])
-    vertices = np.concatenate([vertices for vertices, _, _ in islands])
-    uv = np.concatenate([uv for _, _, uv in islands])
-    triangles = np.concatenate([triangles + start for (_, triangles, _), start in zip(islands, first, strict=False)])
-    mesh = bpy.data.meshes.new("QH Unwrap")
-    mesh.vertices.add(len(vertices))
-    mesh.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
-    mesh.loops.add(triangles.size)
-    mesh.loops.foreach_set("vertex_index", triangles.astype(np.int32).ravel())
-    mesh.polygons.add(len(triangles))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
-    layer = mesh.uv_layers.new(name="UVMap", do_init=False)
-    layer.uv.foreach_set("vector", uv[triangles].astype(np.float32).ravel())
-    mesh.update(calc_edges=True)
-    return mesh, triangles.ravel()
 
 
 def _signed_areas(corners):

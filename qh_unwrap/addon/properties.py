@@ -21,7 +21,8 @@ def _property(field, options=frozenset()):
     limits = dict(min=low, max=high, soft_min=soft_low, soft_max=soft_high)
     if field.type is int:
         return bpy.props.IntProperty(**limits, **common)
-    return bpy.props.FloatProperty(precision=4 if soft_high < 1 else 3, **limits, **common)
+    subtype = 'FACTOR' if (soft_low, soft_high) == (0, 1) else 'NONE'  # a slider
+    return bpy.props.FloatProperty(precision=4 if soft_high < 1 else 3, subtype=subtype, **limits, **common)
 
 
 FIELDS = (*dataclasses.fields(Settings), *dataclasses.fields(MeshOptions))
@@ -64,10 +65,11 @@ class OperatorProperties(SettingsProperties):
                 setattr(self, field.name, getattr(other, field.name))
 
 
+_FIRST = ('boundary', 'aspect', 'balance', 'iterations')
 _SECTIONS = {
-    "Layout": ('placement', 'margin_method', 'margin'),
+    "Layout": ('placement', 'rotate', 'margin_method', 'margin'),
     "Mesh": ('fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data'),
-    "Advanced": ('refine', 'tolerance', 'initial', 'repair', 'tensor_power'),
+    "Advanced": ('initial', 'weights', 'refine', 'repair', 'tolerance', 'tensor_power'),
 }
 
 
@@ -75,8 +77,7 @@ def draw(layout, owner):
     """A row for each property, the rarer ones in sections that fold; what does not apply is greyed out."""
     layout.use_property_split = True
     layout.use_property_decorate = False
-    in_sections = {name for names in _SECTIONS.values() for name in names}
-    _draw_rows(layout, owner, [field.name for field in FIELDS if field.name not in in_sections])
+    _draw_rows(layout, owner, _FIRST)
     for title, names in _SECTIONS.items():
         header, body = layout.panel(f"qh_unwrap_{title.lower()}", default_closed=title != "Layout")
         header.label(text=title)
@@ -100,6 +101,7 @@ def _applies(owner, name):
         'repair': owner.weights == 'COTANGENT',
         'fill_holes': owner.boundary not in ('KEEP', 'FREE'),
         'placement': placed,
+        'rotate': placed and owner.placement == 'PACK',
         'margin': placed and owner.placement != 'UNIT',
         'margin_method': placed and owner.placement != 'UNIT',
     }.get(name, True)

@@ -11,12 +11,15 @@ import numpy as np
 from ..core import Settings, UnwrapError, distortion, unwrap_steps
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import Island, attached, find_islands
-from ..core.validity import orientation
-from . import memory, mesh_arrays, placing
+from ..core.validity import as_stored, orientation
+from . import memory, mesh_arrays, packing, placing
 from .delaunay import triangulate
 from .outcome import Outcome, count
-from .overlaps import overlap, overlapping
+from .overlaps import certified, overlap, overlapping
 from .selection import Target
+
+_FIXED = 300  # vertices that take as long as what an island takes whatever its size
+_LEFT = 0.9  # of an island after each iteration, by and large
 
 
 @dataclass
@@ -77,6 +80,13 @@ class _Work:
         return uv
 
     @property
+    def stored_uv(self):
+        """(n, 2) the new UVs in Blender's single precision, as seen from the side where they are not mirrored."""
+        uv = np.empty_like(self.uv)
+        uv[self.island.corner_vertex] = as_stored(self.corner_uv)
+        return uv * (-1, 1) if self.mirrored else uv
+
+    @property
     def is_cut(self):
         """Whether the old UVs have cuts where there is no seam."""
         gap = self.old_uv[self.island.corner_vertex] - self.mesh.uv[self.island.corners] * self.aspect
@@ -97,22 +107,29 @@ class _Work:
 
 
 def unwrap_targets(targets, settings, options, context):
-    """Unwrap the targets' faces.  A generator: yields (iterations done, iterations at most), returns the outcomes.
+    """Unwrap the targets' faces.  A generator: yields the share that is done, returns the outcomes.
 
     An island that fails is left as it was, and its outcome says why; nothing is written before all are done.
     """
-    works = [work for target in targets for work in _works(target, settings, options)]
-    rounds = settings.iterations + 1
-    for done, work in enumerate(works):
-        yield done * rounds, len(works) * rounds
+    works = []
+    for target in targets:
+        yield 0.0
+        works += _works(target, settings, options)
+    sizes = np.array([_FIXED + len(work.island.vertices) for work in works])
+    for done, size, work in zip(np.cumsum(sizes) - sizes, sizes, works, strict=True):
         try:
-            steps = _unwrap(work)
-            for iteration in steps:
-                yield done * rounds + iteration, len(works) * rounds
+            yield done / sizes.sum()
+            for iteration in _unwrap(work):
+                yield (done + size * (1 - _LEFT**iteration)) / sizes.sum()
         except UnwrapError as error:
             work.outcome.error = str(error)
         except MemoryError:
             work.outcome.error = "the memory ran out: mark seams to cut it into smaller islands"
+    yield 1.0
+    if not all(mesh_arrays.is_as_read(work.target.obj, work.mesh) for work in works):
+        for work in works:
+            work.outcome.error = "a mesh was changed meanwhile: unwrap again"
+        return [work.outcome for work in works]
 
     _place([work for work in works if work.uv is not None], works, options, context)
     placed = [work for work in works if work.uv is not None]
@@ -132,8 +149,10 @@ def _works(target, settings, options):
     hanging = np.zeros(len(mesh.corner_vertex), dtype=bool)
     if stays_attached and mesh.uv is not None:
         hanging = attached(*topology, mesh.uv)
-    for number, island in enumerate(find_islands(*topology, mesh.corner_triangles), start=1):
-        yield _Work(target, mesh, island, Outcome(obj.name, number, len(island.faces)), settings, hanging)
+    islands = find_islands(*topology, mesh.corner_triangles)
+    for number, island in enumerate(islands, start=1):
+        outcome = Outcome(obj.name, number, len(island.faces), alone=len(islands) == 1)
+        yield _Work(target, mesh, island, outcome, settings, hanging)
 
 
 def _unwrap(work):
@@ -151,8 +170,6 @@ def _unwrap(work):
     work.outcome.iterations = result.report.iterations
     work.outcome.converged = result.report.converged
     work.outcome.warnings += tuple(result.report.warnings)
-    if not (result.report.injective or result.report.after.flips or result.report.after.collapsed):
-        work.outcome.warnings += ("it overlaps itself",)
     if work.island.crowded_edges:
         edges = count(work.island.crowded_edges, "edge")
         work.outcome.warnings += (f"it ends at {edges} where more than two faces meet",)
@@ -191,12 +208,14 @@ def _place(works, all_works, options, context):
             work.uv = work.uv * (-1, 1)
         if options.placement == 'UNIT':
             work.uv = placing.in_unit_square(work.uv / work.aspect) * work.aspect
-        elif options.placement == 'PACK':
-            packed.append(work)
-        elif old is not None:
+            continue
+        if old is not None:
             work.uv = placing.in_place(work.uv, work.triangles, old)
         else:
             work.uv = placing.upright(work.uv, work.vertices, work.triangles, work.mesh.up)
+        if options.placement == 'PACK':
+            packed.append(work)
+        elif old is None:
             new.append(work)
     _pack(packed, options, True, context)
     if new:
@@ -207,12 +226,14 @@ def _place(works, all_works, options, context):
                 work.uv = work.uv + (tile, 0) * work.aspect
 
 
-def _pack(works, options, tight, context):
-    if not works:
-        return
+def _pack(works, options, nested, context):
+    works = sorted(works, key=lambda work: work.aspect[0])
+    groups = {
+        aspect: [(work.vertices, work.triangles, work.uv) for work in group]
+        for aspect, group in itertools.groupby(works, key=lambda work: work.aspect[0])
+    }
     try:
-        islands = [(work.vertices, work.triangles, work.uv) for work in works]
-        packed = placing.pack(islands, options, tight, context)
+        packed = packing.pack(groups, options, nested, context) if works else []
     except UnwrapError as error:
         packed = [None] * len(works)
         for work in works:
@@ -256,14 +277,9 @@ def _report_overlaps(works, all_works):
         before.append(rest)
     for i, j in overlapping(now):
         if before[i] is None or before[j] is None or not overlap(before[i], before[j]):
-            for one, other in ((i, j), (j, i)):
-                if one < len(works):
-                    works[one].outcome.overlaps += (names[other],)
-    for work in works:
-        if work.outcome.overlaps:
-            first, *more = work.outcome.overlaps
-            others = f" and {len(more)} more" if more else ""
-            work.outcome.warnings += (f"it lies on {first}{others} now: pack them together",)
+            works[i].outcome.overlaps += (names[j],)
+            if j < len(works):
+                works[j].outcome.overlaps += (names[i],)
 
 
 def _write(obj, works):
@@ -276,13 +292,13 @@ def _write(obj, works):
             work.outcome.error = str(error)
         return
     for work in works:
-        work.outcome.after = _as_stored(work)
         work.outcome.area = placing.area(work.vertices, work.triangles)
+        _judge(work)
 
 
-def _as_stored(work):
-    """The distortion of the UVs that Blender stores: the core's, unless rounding turned faces where they lie now."""
-    seen = work.uv * (-1, 1) if work.mirrored else work.uv
-    if np.array_equal(orientation(seen, work.triangles), work.outcome.after.triangle_orientation):
-        return work.outcome.after
-    return distortion(work.vertices, work.triangles, seen)
+def _judge(work):
+    """Say what there is to say of the UVs that Blender stores, which are rounded where they lie now."""
+    outcome, triangles, uv = work.outcome, work.triangles, work.stored_uv
+    if not np.array_equal(orientation(uv, triangles), outcome.after.triangle_orientation):
+        outcome.after = distortion(work.vertices, triangles, uv * work.aspect)
+    outcome.injective = not (outcome.after.flips or outcome.after.collapsed) and certified(uv, triangles)

@@ -81,7 +81,8 @@ class Surface:
         repeated = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
         if repeated.any():
             raise errors.DegenerateError(
-                f"{_faces(repeated)} with one vertex twice: dissolve degenerate faces", np.flatnonzero(repeated)
+                f"{_count(repeated, 'face', 'faces')} with one vertex twice: dissolve degenerate faces",
+                np.flatnonzero(repeated),
             )
         if len(np.unique(triangles)) < n:
             raise errors.LooseVertexError("some vertices belong to no face: delete the loose vertices")
@@ -90,7 +91,8 @@ class Surface:
         same = (np.diff(a[order]) == 0) & (np.diff(b[order]) == 0) & (np.diff(c[order]) == 0)
         if same.any():
             raise errors.DuplicateError(
-                f"{_faces(same)} on top of another with the same corners: delete the duplicates", order[1:][same]
+                f"{_count(same, 'face', 'faces')} on top of another with the same corners: delete the duplicates",
+                order[1:][same],
             )
 
     def _check_edges(self):
@@ -99,14 +101,15 @@ class Surface:
         start, end = self.half_edges
         if count.max() > 2:
             raise errors.NonManifoldEdgeError(
-                f"{np.sum(count > 2)} edges have more than two faces: split the faces there, or mark seams",
+                f"{_count(count > 2, 'edge has', 'edges have')} more than two faces: split the faces there,"
+                " or mark seams",
                 np.flatnonzero(count[edge] > 2) % len(self.triangles),
             )
         forward = np.bincount(edge, weights=start < end, minlength=len(count))
         wrong = (count == 2) & (forward != 1)
         if wrong.any():
             raise errors.WindingError(
-                f"the faces at {wrong.sum()} edges face opposite ways: recalculate the normals",
+                f"the faces at {_count(wrong, 'edge', 'edges')} face opposite ways: recalculate the normals",
                 np.flatnonzero(wrong[edge]) % len(self.triangles),
             )
         self.on_boundary = count[edge] == 1
@@ -132,10 +135,10 @@ class Surface:
         fans, fan = connected_components(graph, directed=False)
         if fans > len(self.vertices):
             fans_at = np.bincount(self.triangles.T.ravel()[np.unique(fan, return_index=True)[1]])
-            wrong = np.flatnonzero(fans_at > 1)
+            wrong = fans_at > 1
             raise errors.NonManifoldVertexError(
-                f"at {len(wrong)} vertices the surface touches itself: split these vertices",
-                np.flatnonzero(np.isin(self.triangles, wrong).any(axis=1)),
+                f"at {_count(wrong, 'vertex', 'vertices')} the surface touches itself: split it there",
+                np.flatnonzero(wrong[self.triangles].any(axis=1)),
             )
 
     def _check_topology(self):
@@ -263,9 +266,10 @@ def _checked_arrays(vertices, triangles):
     if not np.array_equal(indices, triangles):
         raise errors.ShapeError("triangles must be whole numbers")
     if not np.isfinite(vertices).all():
-        bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+        bad = ~np.isfinite(vertices).all(axis=1)
         raise errors.NotFiniteError(
-            f"{len(bad)} vertices have coordinates that are no numbers (NaN or infinite): delete or move them"
+            f"{_count(bad, 'vertex has', 'vertices have')} coordinates that are no numbers (NaN or infinite):"
+            " delete or move what is there"
         )
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise errors.IndexRangeError(f"a triangle refers to a vertex outside 0 to {len(vertices) - 1}")
@@ -326,6 +330,6 @@ def perimeter(points):
     return edge_lengths(points).sum()
 
 
-def _faces(mask):
-    count = int(np.sum(mask))
-    return f"{count} face" if count == 1 else f"{count} faces"
+def _count(mask, one, more):
+    number = int(np.sum(mask))
+    return f"{number} {one if number == 1 else more}"

@@ -84,7 +84,7 @@ def test_failure_writes_the_rest_and_exits_with_1(tmp_path, capfd):
     source, target = make_file(tmp_path / "in.blend", cube=True), tmp_path / "out.blend"
     assert main([str(source), "-o", str(target)]) == 1
     printed = capfd.readouterr()
-    assert "Box, island 1 (6 faces): " in printed.err and "Panel 1" in printed.out
+    assert "Box (6 faces) is closed: mark a seam" in printed.err and "Panel 1" in printed.out
     panel = next(obj for obj in files.load(target) if obj.name == "Panel")
     assert len(np.unique(np.round(uvs(panel), 5), axis=0)) == 25
 

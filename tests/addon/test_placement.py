@@ -2,10 +2,11 @@
 import bpy
 import numpy as np
 import pytest
-from scenes import add_grid, edit_mode, uvs
+from scenes import add_grid, edit_mode, mesh_object, uvs
 from scipy.spatial import Delaunay
 
 from qh_unwrap.addon import operators, placing
+from qh_unwrap.addon.outcome import sentences, summary
 
 
 def set_uvs(obj, values):
@@ -78,6 +79,54 @@ def test_pack_moves_islands_with_uvs_too():
     assert not overlap(uvs(one), uvs(other))
 
 
+def paint(obj, width, height):
+    """Show an image of that size on the object."""
+    material = bpy.data.materials.new("Paint")
+    material.use_nodes = True
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = bpy.data.images.new("Paint", width, height)
+    obj.data.materials.append(material)
+
+
+@pytest.mark.parametrize("new", [True, False])
+@pytest.mark.parametrize("placement", ['ORIGINAL', 'PACK'])
+@pytest.mark.parametrize("size", [(64, 16), (16, 64), (50, 30)])
+def test_packed_for_an_image_that_is_not_square(size, placement, new):
+    """All of the image is used, nothing is stretched, and texels are equally dense."""
+    one, other = add_grid(4, "One", uv=not new), add_grid(4, "Other", uv=not new, location=(3, 0, 0))
+    for obj in (one, other):
+        for vertex in obj.data.vertices:
+            vertex.co.z = 0
+        paint(obj, *size)
+    other.scale = (2, 2, 2)
+    bpy.context.view_layer.update()
+    bpy.ops.uv.qh_unwrap(placement=placement)
+    if new or placement == 'PACK':
+        both = [uvs(one), uvs(other)]
+        assert min(uv.min() for uv in both) >= 0 and 0.95 < max(uv.max() for uv in both) <= 1
+        assert not overlap(*both)
+        (small, _), (large, _) = area_and_centre(one), area_and_centre(other)
+        assert large / small == pytest.approx(4, rel=0.02)
+    for obj in (one, other):
+        width, height = np.ptp(uvs(obj), axis=0) * size
+        assert width / height == pytest.approx(1, rel=0.01)
+
+
+def test_packed_for_images_of_different_shapes():
+    one, other = add_grid(4, "One"), add_grid(4, "Other", location=(3, 0, 0))
+    for obj, size in ((one, (64, 16)), (other, (16, 64))):
+        for vertex in obj.data.vertices:
+            vertex.co.z = 0
+        paint(obj, *size)
+        obj["size"] = size
+    bpy.ops.uv.qh_unwrap(placement='PACK')
+    assert not overlap(uvs(one), uvs(other))
+    for obj in (one, other):
+        assert uvs(obj).min() >= 0 and uvs(obj).max() <= 1
+        width, height = np.ptp(uvs(obj), axis=0) * obj["size"]
+        assert width / height == pytest.approx(1, rel=0.01)
+
+
 @pytest.mark.parametrize("boundary", ['CIRCLE', 'RECTANGLE', 'OUTLINE'])
 def test_unit_fills_the_square(boundary):
     one, other = add_grid(4, "One"), add_grid(6, "Other", location=(3, 0, 0))
@@ -87,11 +136,16 @@ def test_unit_fills_the_square(boundary):
         assert uvs(obj).min() >= 0 and uvs(obj).max() <= 1
 
 
-@pytest.mark.parametrize("method", ['SCALED', 'ADD'])
-def test_margin(method):
+@pytest.mark.parametrize(("method", "least"), [('SCALED', 0.004), ('ADD', 0.02), ('FRACTION', 0.045)])
+def test_margin(method, least):
+    """As Blender measures it: SCALED is a tenth of the islands' size."""
     one, other = add_grid(2, "One"), add_grid(3, "Other", location=(3, 0, 0))
-    bpy.ops.uv.qh_unwrap(placement='PACK', margin=0.05, margin_method=method)
-    assert np.linalg.norm(uvs(one)[:, None] - uvs(other), axis=2).min() > 0.04
+
+    def margin_of(margin):
+        bpy.ops.uv.qh_unwrap(placement='PACK', margin=margin, margin_method=method)
+        return min(uvs(one).min(), uvs(other).min(), (1 - uvs(one)).min(), (1 - uvs(other)).min())
+
+    assert least < margin_of(0.05) - margin_of(0) < 0.051
 
 
 def height_gradient(obj):
@@ -115,6 +169,43 @@ def test_first_unwrap_is_upright(boundary, rotation):
     across, up = height_gradient(obj)
     assert up > 0 and abs(across) < 0.02 * up
     assert area_and_centre(obj)[0] > 0, "and not mirrored"
+
+
+@pytest.mark.parametrize("boundary", ['FREE', 'CIRCLE', 'RECTANGLE'])
+def test_first_unwrap_of_a_head_is_upright(boundary):
+    """Most of what goes up on one side comes down on the other, and yet it has an upper end."""
+    bpy.ops.mesh.primitive_monkey_add(calc_uvs=False)
+    obj = bpy.context.object
+    for edge in obj.data.edges:
+        one, other = (obj.data.vertices[index].co for index in edge.vertices)
+        edge.use_seam = abs(one.x) + abs(other.x) < 1e-4 and one.y + other.y > -0.5
+    bpy.ops.uv.qh_unwrap(boundary=boundary)
+    head = max(operators.last_outcomes, key=lambda outcome: outcome.faces)
+    assert head.faces == 436 and not head.error
+    vertices = np.array([loop.vertex_index for loop in obj.data.loops])
+    (top, *_), (chin, *_) = (uvs(obj)[vertices == vertex] for vertex in _forehead_and_chin(obj.data))
+    _, up = (top - chin) / np.linalg.norm(top - chin)
+    assert up > 0.95
+
+
+def _forehead_and_chin(mesh):
+    """Vertices in the middle of the face."""
+    middle = [vertex for vertex in mesh.vertices if abs(vertex.co.x) < 1e-4 and vertex.co.y < -0.3]
+    return (pick(middle, key=lambda vertex: vertex.co.z).index for pick in (max, min))
+
+
+@pytest.mark.parametrize("rotate", [True, False])
+def test_packing_turns_islands_only_when_told_to(rotate):
+    """Of walls half of which are tall and half wide, which fit the square better if all are the same."""
+    obj = add_grid(1, uv=False)
+    walls = 6
+    points = [(10 * k + x, 0, z) for k in range(walls) for z in (0, (1, 6)[k % 2]) for x in (0, (6, 1)[k % 2])]
+    obj.data.clear_geometry()
+    obj.data.from_pydata(points, [], [(4 * k, 4 * k + 1, 4 * k + 3, 4 * k + 2) for k in range(walls)])
+    bpy.ops.uv.qh_unwrap(placement='PACK', rotate=rotate)
+    upward = uvs(obj).reshape(walls, 4, 2)[:, 3] - uvs(obj).reshape(walls, 4, 2)[:, 0]
+    upright = (upward[:, 1] > 0) & (np.abs(upward[:, 0]) < 1e-3)
+    assert upright.all() != rotate
 
 
 def test_first_unwrap_of_a_floor_lies_along_its_smallest_box():
@@ -171,7 +262,8 @@ def test_overlap_with_another_island_is_reported_and_named():
         bpy.ops.uv.qh_unwrap(**options)
         one, other = operators.last_outcomes
         assert (one.overlaps, other.overlaps) == (((other.label,), (one.label,)) if expected else ((), ())), options
-        assert any("pack them together" in text for text in one.warnings) == expected
+        told = [text for text in sentences(operators.last_outcomes) if "pack them together" in text]
+        assert told == ([f"{one.label} lies on {other.label} now: pack them together"] if expected else []), "once"
 
 
 def test_stacked_islands_stay_stacked_without_a_warning():
@@ -179,6 +271,26 @@ def test_stacked_islands_stay_stacked_without_a_warning():
     set_uvs(obj, [(abs(vertex.co.x) / 2, vertex.co.y / 2) for vertex in corner_vertices(obj)])
     bpy.ops.uv.qh_unwrap(boundary='CIRCLE')
     assert [outcome.overlaps for outcome in operators.last_outcomes] == [(), ()]
+
+
+@pytest.mark.parametrize(("shift", "expected"), [(0, True), (4096, False), (-4096, False)])
+@pytest.mark.parametrize("options", [{}, {"boundary": 'KEEP'}])
+def test_certificate_counts_where_the_island_lies(options, shift, expected):
+    """A tongs whose arms almost touch: far from the origin, 32-bit floats cannot tell them apart."""
+    half_gaps = np.linspace(0.2, 2e-5, 6)
+    points = [(u, 0.4 * row) for row, half in enumerate(half_gaps) for u in (0, 0.7 - half, 0.7 + half, 1.4)]
+    faces = [(4 * row + k, 4 * row + k + 1, 4 * row + k + 5, 4 * row + k + 4) for row in range(5) for k in (0, 2)]
+    faces.append((1, 2, 6, 5))
+    obj = mesh_object("Tongs", [(u, v, 0) for u, v in points], faces)
+    obj.data.uv_layers.new()
+    set_uvs(obj, [(points[loop.vertex_index][0] + shift, points[loop.vertex_index][1]) for loop in obj.data.loops])
+    bpy.ops.uv.qh_unwrap(**options)
+    (outcome,) = operators.last_outcomes
+    assert (outcome.after.flips, outcome.after.collapsed) == (0, 0)
+    assert (outcome.injective, outcome.is_clean) == (expected, expected)
+    told = list(sentences([outcome]))
+    assert told == ([] if expected else ["Tongs (11 faces) overlaps itself"])
+    assert summary([outcome]).endswith("no flips" if expected else "no flips; 1 on top of itself")
 
 
 def corner_vertices(obj):

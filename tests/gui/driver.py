@@ -16,9 +16,15 @@ def steps(gui):
     yield 1
     _add(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
     _show_checker(gui)
+    bpy.ops.ed.undo_push(message="Checker")
     yield 2
+    yield from _menus(gui)
+    yield from _sidebars(gui)
+    yield from _reports(gui)
+    yield from _long_work(gui)
 
-    # The operator from the menu of the 3D View
+
+def _menus(gui):
     before = _uvs()
     yield from _open_menu(gui, 'VIEW_3D')
     gui.shot("1_menu_view_3d.png")
@@ -26,13 +32,8 @@ def steps(gui):
     yield 2
     assert not np.array_equal(_uvs(), before), "the menu entry did nothing"
     gui.shot("2_report.png")
-    gui.click(*gui.xy(gui.region(gui.area('VIEW_3D'), "HUD"), 0.3, 0.5))
-    yield 3
-    gui.shot("3_redo_panel.png")
-    gui.click(*gui.xy(gui.region(gui.area('VIEW_3D'), "HUD"), 0.3, 0.04))
-    yield 1
+    yield from _redo(gui, "3_redo_panel.png")
 
-    # and of the UV Editor
     with gui.override('IMAGE_EDITOR'):
         bpy.ops.image.view_all(fit_view=True)
     yield 1
@@ -46,17 +47,38 @@ def steps(gui):
     gui.shot("5_layout_with_checker.png")
     overlay.show_overlays = True
 
-    # The sidebars, whose button uses the settings of the scene
+
+def _redo(gui, shot):
+    """Open the redo panel, turn the boundary to Circle and back with the wheel, and close it."""
+    before = _uvs()
+    gui.click(*gui.xy(gui.region(gui.area('VIEW_3D'), "HUD"), 0.3, 0.5))
+    yield 3
+    gui.shot(shot)
+    x, y = gui.xy(gui.region(gui.area('VIEW_3D'), "HUD"), 0.7, 0)
+    for wheel, changes in ((5, True), (4, False)):
+        gui.xdo("mousemove", x - 2, y + 42, "mousemove", x, y + 42, "sleep", 0.2)
+        gui.xdo("keydown", "ctrl", "click", wheel, "keyup", "ctrl")
+        yield 5
+        assert np.allclose(_uvs(), before, atol=1e-4) != changes, "the redo panel did nothing, or did not come back"
+        if changes:
+            gui.shot(shot.replace(".", "_changed."))
+    gui.click(*gui.xy(gui.region(gui.area('VIEW_3D'), "HUD"), 0.3, 0.04))
+    yield 1
+
+
+def _sidebars(gui):
+    """Their buttons use the settings of the scene."""
     for number, editor in enumerate(('VIEW_3D', 'IMAGE_EDITOR'), start=6):
         gui.sidebar(editor)
         yield 1
         gui.sidebar(editor, "QH Unwrap")
         yield 1
         gui.shot(f"{number}_sidebar_{editor.lower()}.png")
-    for section in ("Advanced", "Mesh"):
-        gui.click(*_button(gui, 'VIEW_3D', _BUTTONS[section]))
-        yield 1
-    gui.shot("8_sidebar_with_all_sections.png")
+    for editor in ('VIEW_3D', 'IMAGE_EDITOR'):
+        for section in ("Advanced", "Mesh"):
+            gui.click(*_button(gui, editor, _BUTTONS[section]))
+            yield 1
+    gui.shot("8_sidebars_with_all_sections.png")
 
     bpy.context.scene.qh_unwrap.placement = 'PACK'
     before = _uvs()
@@ -76,8 +98,11 @@ def steps(gui):
     gui.key("ctrl+z")
     yield 2
     assert np.array_equal(_uvs(), before), "undo did not restore"
+    bpy.context.scene.qh_unwrap.placement = 'ORIGINAL'
 
-    # What goes wrong is said
+
+def _reports(gui):
+    """What goes wrong is said."""
     _add(gui, bpy.ops.mesh.primitive_cube_add, lambda one, other: False)
     yield 1
     gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Unwrap"]))
@@ -90,7 +115,75 @@ def steps(gui):
     gui.shot("12_reports.png")
 
 
-_BUTTONS = {"Unwrap": 43, "Mesh": 264, "Advanced": 288}  # pixels below the top of the sidebar
+def _long_work(gui):
+    """It shows how far it is; ESC, an error and another file end it, and leave nothing behind."""
+    for area in (area for area in gui.window.screen.areas if area.type == 'VIEW_3D'):
+        area.spaces.active.show_region_ui = False
+    _add(gui, _sheet(100), lambda one, other: False)
+    yield 2
+    yield from _begin(gui)
+    yield from _end(gui)
+    yield 1
+    assert _uvs().any(), "not unwrapped in the end"
+    gui.shot("13_finished.png")
+    yield from _redo(gui, "14_redo_panel_afterwards.png")
+    gui.key("ctrl+z")
+    yield 2
+    assert not _uvs().any(), "it takes more than one step to undo"
+
+    _add(gui, _sheet(388), lambda one, other: False)
+    yield 5
+    yield from _begin(gui)
+    yield 1
+    gui.shot("15_running.png")
+    gui.key("g")
+    yield 0.5
+    assert [operator.bl_idname for operator in gui.window.modal_operators] == ["UV_OT_qh_unwrap"], "a key got through"
+    gui.key("Escape")
+    yield from _end(gui)
+    yield 2
+    gui.shot("16_cancelled.png")
+    assert not _uvs().any() and bpy.context.mode == 'EDIT_MESH', "ESC changed something"
+
+
+def _begin(gui):
+    """Unwrap from the menu, until it is under way."""
+    yield from _open_menu(gui, 'VIEW_3D')
+    gui.key("q")
+    for _ in range(100):
+        yield 0.1
+        if _is_running(gui):
+            return
+    raise AssertionError("it did not go on beside the window")
+
+
+def _end(gui):
+    for _ in range(600):
+        yield 0.1
+        if not _is_running(gui):
+            return
+    raise AssertionError("it did not end")
+
+
+def _is_running(gui):
+    return "UV_OT_qh_unwrap" in [operator.bl_idname for operator in gui.window.modal_operators]
+
+
+def _sheet(size):
+    """Adds a wavy sheet of size x size quads."""
+
+    def add(calc_uvs):
+        bpy.ops.mesh.primitive_grid_add(x_subdivisions=size, y_subdivisions=size, calc_uvs=calc_uvs)
+        mesh = bpy.context.object.data
+        points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+        mesh.vertices.foreach_get("co", points.ravel())
+        points[:, 2] = 0.4 * np.sin(5 * points[:, 0]) * np.cos(4 * points[:, 1])
+        mesh.vertices.foreach_set("co", points.ravel())
+
+    return add
+
+
+_BUTTONS = {"Unwrap": 43, "Mesh": 266, "Advanced": 291}  # pixels below the top of the sidebar
 
 
 def _add(gui, add, is_seam):
@@ -110,6 +203,7 @@ def _add(gui, add, is_seam):
         bmesh.update_edit_mesh(mesh)
         bpy.ops.view3d.view_axis(type='FRONT')
         bpy.ops.view3d.view_selected()
+        bpy.ops.ed.undo_push(message="Scene")  # where undo, and with it the redo panel, comes back to
 
 
 def _is_seam(one, other):

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Laying islands out beside one another, by Blender's own packer."""
+
+import bpy
+import numpy as np
+
+from ..core import UnwrapError
+
+_NAME = "QH Unwrap"
+
+
+def pack(groups, options, nested, context):
+    """Lay islands out in the 0 to 1 square; returns their new UVs, one after another.
+
+    groups  {aspect: [(vertices, triangles, uv), ...]}, by the aspect of the image; UVs have its proportions
+
+    They get the same texel density.  If `nested`, they fit into one another, which may take Blender a minute, and are
+    turned by right angles if the options say so; else their boxes lie side by side.  Blender packs what is selected in
+    Edit Mode, so this happens in a scene of its own, where no one's selection is disturbed.  Raises `UnwrapError` if
+    Blender does not.
+    """
+    scene = bpy.data.scenes.new(_NAME)
+    made = [scene]
+    try:
+        meshes = [_mesh(aspect, islands, made) for aspect, islands in groups.items()]
+        if not _done(scene, meshes, options, nested, context):
+            raise UnwrapError("Blender could not pack the islands: choose the placement Unit Square")
+        return [uv for mesh, group in zip(meshes, groups.items(), strict=True) for uv in _uvs(mesh, *group)]
+    finally:
+        bpy.data.batch_remove(made)
+
+
+def _done(scene, meshes, options, nested, context):
+    view_layer = scene.view_layers[0]
+    for mesh in meshes:
+        obj = bpy.data.objects.new(_NAME, mesh)
+        scene.collection.objects.link(obj)
+        obj.select_set(True, view_layer=view_layer)
+        view_layer.objects.active = obj
+    if not scene.tool_settings.use_uv_select_sync:  # set in Blender 5, where setting it changes selections
+        scene.tool_settings.use_uv_select_sync = True
+    with context.temp_override(
+        scene=scene,
+        view_layer=view_layer,
+        active_object=obj,
+        object=obj,
+        edit_object=obj,
+        area=None,  # an image editor would have the islands packed into the tile where they lie
+        region=None,
+    ):
+        bpy.ops.ptcache.bake_all(bake=False)  # forgets an ESC pressed before, at which the packer silently stops
+        bpy.ops.object.mode_set(mode='EDIT')
+        bpy.ops.mesh.select_all(action='SELECT')
+        bpy.ops.uv.average_islands_scale()
+        done = bpy.ops.uv.pack_islands(
+            udim_source='CLOSEST_UDIM',
+            rotate=nested and options.rotate,
+            rotate_method='CARDINAL',
+            scale=True,
+            merge_overlap=False,
+            margin_method=options.margin_method,
+            margin=options.margin,
+            pin=False,
+            shape_method='CONCAVE' if nested else 'AABB',
+        )
+        bpy.ops.object.mode_set(mode='OBJECT')
+    return done == {'FINISHED'}
+
+
+def _mesh(aspect, islands, made):
+    """One mesh of all the islands' triangles, with an image of that aspect."""
+    first = np.cumsum([0] + [len(vertices) for vertices, _, _ in islands])
+    vertices = np.concatenate([vertices for vertices, _, _ in islands])
+    uv = np.concatenate([uv for _, _, uv in islands]) / (aspect, 1)
+    triangles = np.concatenate([triangles + start for (_, triangles, _), start in zip(islands, first, strict=False)])
+    mesh = bpy.data.meshes.new(_NAME)
+    made.append(mesh)
+    mesh.vertices.add(len(vertices))
+    mesh.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
+    mesh.loops.add(triangles.size)
+    mesh.loops.foreach_set("vertex_index", triangles.astype(np.int32).ravel())
+    mesh.polygons.add(len(triangles))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    layer = mesh.uv_layers.new(name="UVMap", do_init=False)
+    layer.uv.foreach_set("vector", uv[triangles].astype(np.float32).ravel())
+    mesh.update(calc_edges=True)
+    if aspect != 1:
+        mesh.materials.append(_material(aspect, made))
+    return mesh
+
+
+def _material(aspect, made):
+    image = bpy.data.images.new(_NAME, 1, 1)
+    image.display_aspect = (aspect, 1) if aspect > 1 else (1, 1 / aspect)
+    material = bpy.data.materials.new(_NAME)
+    made += image, material
+    if material.node_tree is None:
+        material.use_nodes = True
+    material.node_tree.nodes.new("ShaderNodeTexImage").image = image
+    return material
+
+
+def _uvs(mesh, aspect, islands):
+    vertex = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", vertex)
+    corners = np.empty(2 * len(mesh.loops), dtype=np.float32)
+    mesh.uv_layers[0].uv.foreach_get("vector", corners)
+    uv = np.empty((len(mesh.vertices), 2))
+    uv[vertex] = corners.reshape(-1, 2) * (aspect, 1)
+    return np.split(uv, np.cumsum([len(vertices) for vertices, _, _ in islands])[:-1])
