@@ -3,6 +3,7 @@
 
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 
 import bmesh
 import bpy
@@ -24,6 +25,11 @@ class MeshArrays:
     uv: np.ndarray | None  # (c, 2) float64
     pinned: np.ndarray  # (c,) bool
     aspect: np.ndarray  # (f,) width by height of the image on each face
+
+    @cached_property
+    def one_aspect(self):
+        """That of all faces, None if they differ."""
+        return self.aspect[0] if len(self.aspect) and (self.aspect == self.aspect[0]).all() else None
 
 
 def read(obj, options=None):

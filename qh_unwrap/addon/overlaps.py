@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which islands lie on top of each other in the plane, or on top of themselves."""
+"""Which islands lie on top of each other in the plane."""
 
 import numpy as np
 
-from ..core.validity import is_injective, orientation
+from .placing import boxes
 
 _DEPTH = 1e-5  # of the size of the smaller triangle: what merely touches does not overlap
 _AT_ONCE = 1 << 20  # pairs of triangles looked at in one go
@@ -11,9 +11,8 @@ _AT_ONCE = 1 << 20  # pairs of triangles looked at in one go
 
 def overlapping(islands):
     """The pairs (i, j), i < j, of islands, each given as triangles (t, 3, 2), that share some area."""
-    boxes = np.array([(island.min(axis=(0, 1)), island.max(axis=(0, 1))) for island in islands])
     found = []
-    for one, other in _meeting(boxes[:, 0], boxes[:, 1]):
+    for one, other in _meeting(*boxes([island.reshape(-1, 2) for island in islands])):
         pairs = zip(one.tolist(), other.tolist(), strict=True)
         found += [(min(pair), max(pair)) for pair in pairs if overlap(*(islands[k] for k in pair))]
     return sorted(found)
@@ -32,24 +31,6 @@ def overlap(one, other):
         if _share_area(both[first[apart]], both[second[apart]]).any():
             return True
     return False
-
-
-def certified(uv, triangles):
-    """Whether the island is certain to cover no place twice in 32-bit floats; triangles without area do not count."""
-    return is_injective(uv, triangles[orientation(uv, triangles) != 0], list(_outlines(triangles)))
-
-
-def _outlines(triangles):
-    """The boundary loops, each in the direction of its triangles' winding."""
-    start, end = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    count = triangles.max() + 1
-    alone = ~np.isin(start * count + end, end * count + start)
-    following = dict(zip(start[alone].tolist(), end[alone].tolist(), strict=True))
-    while following:
-        loop = [next(iter(following))]
-        while loop[-1] in following:
-            loop.append(following.pop(loop[-1]))
-        yield loop[1:]
 
 
 def _meets(triangles, low, high):

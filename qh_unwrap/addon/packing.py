@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 
 from ..core import UnwrapError
+from . import placing
 
 _NAME = "QH Unwrap"
 
@@ -19,6 +20,31 @@ def pack(groups, options, nested, context):
     Edit Mode, so this happens in a scene of its own, where no one's selection is disturbed.  Raises `UnwrapError` if
     Blender does not.
     """
+    if not nested:
+        return _pack_boxes(groups, options, context)
+    return _pack(groups, options, nested, context)
+
+
+def _pack_boxes(groups, options, context):
+    """The same for their boxes, which lie side by side: of each island Blender gets a rectangle."""
+    islands = [island for group in groups.values() for island in group]
+    uvs = [uv for _, _, uv in islands]
+    low, high = placing.boxes(uvs)
+    high = np.maximum(high, low + 1e-6 * (high - low).max())
+    in_layout = placing.uv_areas([(uv, triangles) for _, triangles, uv in islands])
+    stretch = np.sqrt(placing.areas([island[:2] for island in islands]) / np.maximum(in_layout, 1e-300))
+    corners = np.stack([low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])])
+    corners = corners.swapaxes(0, 1)
+    in_space = np.pad(corners * stretch[:, None, None], ((0, 0), (0, 0), (0, 1)))
+    halves = np.array([[0, 1, 2], [0, 2, 3]])
+    rectangles = iter([(there, halves, here) for there, here in zip(in_space, corners, strict=True)])
+    boxes = {aspect: [next(rectangles) for _ in group] for aspect, group in groups.items()}
+    packed = np.array(_pack(boxes, options, False, context))
+    scale = np.ptp(packed, axis=1).max(axis=1) / (high - low).max(axis=1)
+    return [(uv - old) * size + new for uv, old, size, new in zip(uvs, low, scale, packed[:, 0], strict=True)]
+
+
+def _pack(groups, options, nested, context):
     scene = bpy.data.scenes.new(_NAME)
     made = [scene]
     try:

@@ -38,18 +38,30 @@ def is_mirrored(corners):
     return _signed_areas(corners).sum() < 0
 
 
-def upright(uv, vertices, triangles, up):
-    """Turn `uv` (n, 2) so that what is up in space is up; where it lies too flat for that, to its smallest box."""
-    corners, heights = uv[triangles], (vertices @ up)[triangles]
+def upright(islands):
+    """Turn islands, each given as (uv, vertices, triangles, up), so that what is up in space is up; returns their UVs.
+
+    Where one lies too flat for that, it is turned to its smallest box.
+    """
+    uvs, _, triangles, _ = zip(*islands, strict=True)
+    starts = _starts(triangles)
+    corners = np.concatenate([uv[its] for uv, _, its, _ in islands])
+    heights = np.concatenate([(vertices @ up)[its] for _, vertices, its, up in islands])
+    piece = _numbers(starts, len(corners))
     weight = np.abs(_signed_areas(corners))
-    offset = (corners - _centre(corners)) * np.sqrt(area(vertices, triangles) / weight.sum())
-    weights = np.repeat(weight[:, None], 3, axis=1)
+    total = np.add.reduceat(weight, starts)
+    centre = np.add.reduceat(weight[:, None] * corners.mean(axis=1), starts) / total[:, None]
+    size = np.sqrt(areas([(vertices, its) for _, vertices, its, _ in islands]) / total)
+    offset = (corners - centre[piece, None]) * size[piece, None, None]
     # The slope of the height over the layout, by least squares.
-    spread = np.einsum("tc,tci,tcj->ij", weights, offset, offset)
-    slope = np.linalg.lstsq(spread, np.einsum("tc,tci,tc->i", weights, offset, heights), rcond=None)[0]
-    if np.linalg.norm(slope) > _STEEPEST_FLAT:
-        return _turned(uv, 1j / complex(*(slope / np.linalg.norm(slope))))
-    return _on_smallest_box(uv)
+    spread = np.add.reduceat(np.einsum("t,tci,tcj->tij", weight, offset, offset), starts)
+    moment = np.add.reduceat(np.einsum("t,tci,tc->ti", weight, offset, heights), starts)
+    slope = (np.linalg.pinv(spread) @ moment[:, :, None])[:, :, 0]
+    steepness = np.linalg.norm(slope, axis=1)
+    turned = []
+    for uv, steep, way in zip(uvs, steepness > _STEEPEST_FLAT, slope @ (1, 1j), strict=True):
+        turned.append(_turned(uv, 1j * abs(way) / way) if steep else _on_smallest_box(uv))
+    return turned
 
 
 def _on_smallest_box(uv):
@@ -93,9 +105,31 @@ def _signed_areas(corners):
     return (x1 * y2 - x2 * y1) / 2
 
 
-def area(vertices, triangles):
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+def areas(islands):
+    """The areas in space, (k,), of islands given as (vertices, triangles)."""
+    a, b, c = np.concatenate([vertices[triangles] for vertices, triangles in islands]).transpose(1, 0, 2)
+    starts = _starts([triangles for _, triangles in islands])
+    return np.add.reduceat(np.linalg.norm(np.cross(b - a, c - a), axis=1), starts) / 2
+
+
+def uv_areas(islands):
+    """The areas in the layout, (k,), of islands given as (uv, triangles)."""
+    corners = np.concatenate([uv[triangles] for uv, triangles in islands])
+    return np.add.reduceat(np.abs(_signed_areas(corners)), _starts([triangles for _, triangles in islands]))
+
+
+def boxes(uvs):
+    """Lower left and upper right corners, (k, 2) each, of the islands' UVs."""
+    starts, uv = _starts(uvs), np.concatenate(uvs)
+    return np.minimum.reduceat(uv, starts), np.maximum.reduceat(uv, starts)
+
+
+def _starts(arrays):
+    return np.cumsum([0, *(len(each) for each in arrays[:-1])])
+
+
+def _numbers(starts, count):
+    return np.repeat(np.arange(len(starts)), np.diff(starts, append=count))
 
 
 def _centre(corners):

@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core import Settings, UnwrapError, distortion, unwrap_steps
+from ..core import Settings, UnwrapError, distortion, unwrap_steps, unwrap_together
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import Island, attached, find_islands
-from ..core.validity import as_stored, orientation
+from ..core.validity import are_injective, as_stored, orientation
 from . import memory, mesh_arrays, packing, placing
 from .delaunay import triangulate
 from .outcome import Outcome, count
-from .overlaps import certified, overlap, overlapping
+from .overlaps import overlap, overlapping
 from .selection import Target
 
 _FIXED = 300  # vertices that take as long as what an island takes whatever its size
@@ -33,12 +33,15 @@ class _Work:
     settings: Settings
     attached: np.ndarray  # (c,) bool, the mesh's corners that hang on faces that are not unwrapped
     uv: np.ndarray | None = None  # (n, 2) the new ones
+    loops: list | None = None  # its boundary
     mirrored: bool = False
     in_frame: bool = False  # of the old UVs, because something of them is held
 
     @cached_property
     def aspect(self):
         """(2,) what to multiply UVs with: of the image that most faces show."""
+        if self.mesh.one_aspect is not None:
+            return np.array([self.mesh.one_aspect, 1.0])
         values, counts = np.unique(self.mesh.aspect[self.island.faces], return_counts=True)
         return np.array([values[np.argmax(counts)], 1.0])
 
@@ -54,7 +57,7 @@ class _Work:
         uv[self.island.corner_vertex] = corner_uv
         return uv * self.aspect
 
-    @property
+    @cached_property
     def old_triangles(self):
         """The triangles' old UVs (t, 3, 2), None if they do not say where the island belongs."""
         if self.old_uv is None:
@@ -62,7 +65,7 @@ class _Work:
         old = self.mesh.uv[self.island.triangle_corners] * self.aspect
         return old if placing.says_where(old) else None
 
-    @property
+    @cached_property
     def vertices(self):
         return self.mesh.vertices[self.island.vertices]
 
@@ -93,6 +96,11 @@ class _Work:
         return np.abs(gap).max() > 1e-5 * np.ptp(self.old_uv, axis=0).max()
 
     @property
+    def is_free(self):
+        """Whether nothing of it is held: no pin, and no face that is not unwrapped."""
+        return not (self.mesh.pinned[self.island.corners].any() or self.attached[self.island.corners].any())
+
+    @property
     def pinned(self):
         return self._vertices_of(self.mesh.pinned)
 
@@ -116,7 +124,11 @@ def unwrap_targets(targets, settings, options, context):
         yield 0.0
         works += _works(target, settings, options)
     sizes = np.array([_FIXED + len(work.island.vertices) for work in works])
+    for done in _unwrap_together(works):
+        yield sizes[:done].sum() / sizes.sum() / 2
     for done, size, work in zip(np.cumsum(sizes) - sizes, sizes, works, strict=True):
+        if work.uv is not None:
+            continue
         try:
             yield done / sizes.sum()
             for iteration in _unwrap(work):
@@ -155,6 +167,28 @@ def _works(target, settings, options):
         yield _Work(target, mesh, island, outcome, settings, hanging)
 
 
+def _unwrap_together(works):
+    """Unwrap what is small and hangs on nothing, all at once; yields the number of works looked at so far."""
+    if not works:
+        return
+    suiting = [k for k, work in enumerate(works) if work.is_free]
+    islands = []
+    for k in suiting:
+        work = works[k]
+        uv = work.old_uv
+        islands.append((work.vertices, work.triangles, None if uv is None or work.is_cut else uv))
+    steps = unwrap_together(islands, works[0].settings)
+    while True:
+        try:
+            yield suiting[next(steps) - 1] + 1
+        except StopIteration as stop:
+            results = stop.value
+            break
+    for k, result in zip(suiting, results, strict=True):
+        if result is not None:
+            _keep(works[k], result)
+
+
 def _unwrap(work):
     memory.check(len(work.vertices), memory.free())
     hanging = work.hanging if work.old_triangles is not None else np.zeros(len(work.vertices), dtype=bool)
@@ -164,7 +198,11 @@ def _unwrap(work):
         if not hanging.any():
             raise
         raise type(error)(f"{error} (faces that are not selected hang on it: or select all of its island)") from None
-    work.uv = result.uv
+    _keep(work, result)
+
+
+def _keep(work, result):
+    work.uv, work.loops = result.uv, result.loops
     work.mirrored = result.report.mirrored
     work.outcome.before, work.outcome.after = result.report.before, result.report.after
     work.outcome.iterations = result.report.iterations
@@ -198,27 +236,26 @@ def _result(work, hanging):
 
 
 def _place(works, all_works, options, context):
-    new, packed = [], []
+    works = [work for work in works if not work.in_frame]
     for work in works:
-        if work.in_frame:
-            continue
         old = work.old_triangles
         work.mirrored = old is not None and placing.is_mirrored(old)
         if work.mirrored:
             work.uv = work.uv * (-1, 1)
         if options.placement == 'UNIT':
             work.uv = placing.in_unit_square(work.uv / work.aspect) * work.aspect
-            continue
-        if old is not None:
+        elif old is not None:
             work.uv = placing.in_place(work.uv, work.triangles, old)
-        else:
-            work.uv = placing.upright(work.uv, work.vertices, work.triangles, work.mesh.up)
-        if options.placement == 'PACK':
-            packed.append(work)
-        elif old is None:
-            new.append(work)
-    _pack(packed, options, True, context)
+    if options.placement == 'UNIT':
+        return
+    new = [work for work in works if work.old_triangles is None]
     if new:
+        turned = placing.upright([(work.uv, work.vertices, work.triangles, work.mesh.up) for work in new])
+        for work, uv in zip(new, turned, strict=True):
+            work.uv = uv
+    if options.placement == 'PACK':
+        _pack(works, options, True, context)
+    elif new:
         _pack(new, options, False, context)
         tile = placing.free_tile(np.concatenate([np.empty((0, 2)), *_others(new, all_works)]))
         for work in new:
@@ -291,14 +328,30 @@ def _write(obj, works):
         for work in works:
             work.outcome.error = str(error)
         return
-    for work in works:
-        work.outcome.area = placing.area(work.vertices, work.triangles)
-        _judge(work)
+    areas = placing.areas([(work.vertices, work.triangles) for work in works])
+    for work, area in zip(works, areas.tolist(), strict=True):
+        work.outcome.area = area
+    _judge(works)
 
 
-def _judge(work):
+def _judge(works):
     """Say what there is to say of the UVs that Blender stores, which are rounded where they lie now."""
-    outcome, triangles, uv = work.outcome, work.triangles, work.stored_uv
-    if not np.array_equal(orientation(uv, triangles), outcome.after.triangle_orientation):
-        outcome.after = distortion(work.vertices, triangles, uv * work.aspect)
-    outcome.injective = not (outcome.after.flips or outcome.after.collapsed) and certified(uv, triangles)
+    uvs = [work.stored_uv for work in works]
+    first = np.cumsum([0, *(len(uv) for uv in uvs[:-1])])
+    number = np.arange(len(works))
+    piece = np.repeat(number, [len(work.triangles) for work in works])
+    triangles = np.concatenate([work.triangles + start for work, start in zip(works, first, strict=True)])
+    uv = np.concatenate(uvs)
+    sign = orientation(uv, triangles)
+    changed = sign != np.concatenate([work.outcome.after.triangle_orientation for work in works])
+    for k in np.unique(piece[changed]):
+        work = works[k]
+        work.outcome.after = distortion(work.vertices, work.triangles, uvs[k] * work.aspect)
+
+    loops = [loop + start for work, start in zip(works, first, strict=True) for loop in work.loops]
+    solid = sign != 0  # those without area do not count, unless they should have some
+    loop_piece = np.repeat(number, [len(work.loops) for work in works])
+    certified = are_injective(uv, triangles[solid], piece[solid], loops, loop_piece)
+    for work, certain in zip(works, certified.tolist(), strict=True):
+        after = work.outcome.after
+        work.outcome.injective = certain and not (after.flips or after.collapsed)

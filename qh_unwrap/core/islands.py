@@ -45,31 +45,46 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
     face_island = _components(face_count, corner_face[one], corner_face[start])
 
     corner_triangles = _without_doubled_diagonals(corner_triangles, following, uv_vertex)
-    faces = _by_island(np.flatnonzero(selected), face_island)
-    corners = _by_island(chosen_corners, face_island[corner_face])
+    chosen = np.flatnonzero(selected)
+    _, first, rank = np.unique(face_island[chosen], return_index=True, return_inverse=True)
+    island_order = np.argsort(np.argsort(first))  # by the first face
+    face_rank = np.zeros(face_count, dtype=np.intp)
+    face_rank[chosen] = island_order[rank]
+    corner_rank = face_rank[corner_face]
     triangle_face = corner_face[corner_triangles[:, 0]]
-    triangles = _by_island(np.flatnonzero(selected[triangle_face]), face_island[triangle_face])
+    chosen_triangles = np.flatnonzero(selected[triangle_face])
+
+    # The islands' vertices: those of one follow one another
+    corners, _ = _grouped(chosen_corners, corner_rank)
+    key = corner_rank[corners] * corner_count + uv_vertex[corners]
+    key, example, vertex = np.unique(key, return_index=True, return_inverse=True)
+    first_vertex = np.searchsorted(key, np.arange(len(first)) * corner_count)
+    island_vertex = np.zeros(corner_count, dtype=np.intp)
+    island_vertex[corners] = vertex - first_vertex[corner_rank[corners]]
 
     crowded = (np.bincount(corner_edge[chosen_corners], minlength=len(seam)) > 2) & ~seam
+    crowded_corners = chosen_corners[crowded[corner_edge[chosen_corners]]]
+    pairs = np.unique(corner_rank[crowded_corners] * len(seam) + corner_edge[crowded_corners])
+    crowded_edges = np.bincount(pairs // max(len(seam), 1), minlength=len(first)).tolist()
 
-    islands = []
-    island_vertex = np.empty(corner_count, dtype=np.intp)
-    for own_faces, own_corners, own_triangles in zip(faces, corners, triangles, strict=True):
-        _, first, inverse = np.unique(uv_vertex[own_corners], return_index=True, return_inverse=True)
-        island_vertex[own_corners] = inverse
-        own_edges = corner_edge[own_corners]
-        islands.append(
-            Island(
-                faces=own_faces,
-                corners=own_corners,
-                corner_vertex=inverse,
-                vertices=corner_vertex[own_corners[first]],
-                triangles=island_vertex[corner_triangles[own_triangles]],
-                triangle_corners=corner_triangles[own_triangles],
-                crowded_edges=len(np.unique(own_edges[crowded[own_edges]])),
-            )
+    def split(items, rank):
+        items, starts = _grouped(items, rank)
+        return np.split(items, starts[1:]) if len(items) else []
+
+    triangles, starts = _grouped(chosen_triangles, face_rank[triangle_face])
+    triangle_corners = np.split(corner_triangles[triangles], starts[1:]) if len(first) else []
+    vertices = np.split(corner_vertex[corners[example]], first_vertex[1:]) if len(first) else []
+    return [
+        Island(own_faces, own_corners, island_vertex[own_corners], own_vertices, island_vertex[own], own, edges)
+        for own_faces, own_corners, own_vertices, own, edges in zip(
+            split(chosen, face_rank),
+            split(chosen_corners, corner_rank),
+            vertices,
+            triangle_corners,
+            crowded_edges,
+            strict=True,
         )
-    return islands
+    ]
 
 
 def cuts(corner_vertex, corner_edge, face_start, edge_count, uv, tolerance=1e-6):
@@ -157,8 +172,8 @@ def _components(count, one, other):
     return connected_components(links, directed=False)[1]
 
 
-def _by_island(items, island):
-    """The items grouped by their island, groups in order of their smallest item."""
-    items = items[np.argsort(island[items], kind="stable")]
-    groups = np.split(items, np.flatnonzero(np.diff(island[items])) + 1) if len(items) else []
-    return sorted(groups, key=lambda group: group[0])
+def _grouped(items, rank):
+    """The items sorted by their rank, and where each rank begins; equal ones stay in order."""
+    own = rank[items]
+    order = np.argsort(own, kind="stable")
+    return items[order], np.searchsorted(own[order], np.arange(own.max(initial=-1) + 1))

@@ -150,7 +150,7 @@ class Surface:
             raise errors.DisconnectedError(f"it has {found} separate pieces: unwrap each on its own")
         loops, vertices, edges, triangles = (
             np.bincount(self.vertex_piece[of], minlength=p)
-            for of in ([loop[0] for loop in self.loops], np.arange(n), a, self.triangles[:, 0])
+            for of in ([loop[0] for loop in self.loops], slice(None), a, self.triangles[:, 0])
         )
         if not loops.all():
             raise errors.ClosedError("it is closed: mark a seam to cut it open")
@@ -159,6 +159,11 @@ class Surface:
             raise errors.GenusError(
                 f"it has {handles} {'handle' if handles == 1 else 'handles'}, like a torus: mark seams to cut it open"
             )
+
+    @property
+    def loop_piece(self):
+        """The piece of every loop, (l,)."""
+        return self.vertex_piece[[loop[0] for loop in self.loops]]
 
     @property
     def half_edges(self):

@@ -58,9 +58,8 @@ def _unwrap(islands, settings):
             return [None]
         half = len(islands) // 2
         return _unwrap(islands[:half], settings) + _unwrap(islands[half:], settings)
-    loops = np.bincount(surface.vertex_piece[[loop[0] for loop in surface.loops]])
-    if (loops > 1).any():
-        return _unwrap_some(islands, loops == 1, settings)
+    if len(surface.loops) > len(islands):
+        return _unwrap_some(islands, np.bincount(surface.loop_piece) == 1, settings)
     start = _best_start(surface, settings.balance)
     value = energies(surface, start, settings.balance)
     if not (value < _FAIR).all():
@@ -77,7 +76,8 @@ def _unwrap(islands, settings):
             uv, converged = moved, converged | done
     low, size = _extent(surface, uv)
     placed = (uv - low[surface.vertex_piece]) / size.max(axis=1)[surface.vertex_piece, None]
-    finished = are_injective(placed, surface) & (converged | (settings.refine <= _STEPS))
+    certified = are_injective(placed, surface.triangles, surface.piece, surface.loops, surface.loop_piece)
+    finished = certified & (converged | (settings.refine <= _STEPS))
     return _results(islands, surface, start, placed, finished, converged, np.reshape(changes, (-1, len(islands))))
 
 
@@ -121,6 +121,8 @@ def _results(islands, surface, start, uv, finished, converged, changes):
         measure_pieces(surface, start),
         measure_pieces(surface, uv),
         np.split(uv, surface.vertex_starts[1:]),
+        surface.vertex_starts.tolist(),
+        surface.loops,  # as many as there are pieces, and in their order
         surface.sums(surface.degenerate.astype(int)).tolist(),
         finished.tolist(),
         converged.tolist(),
@@ -128,7 +130,7 @@ def _results(islands, surface, start, uv, finished, converged, changes):
         strict=True,
     )
     results = []
-    for (_, _, given), before, initial, after, its_uv, flat, done, settled, its_changes in rows:
+    for (_, _, given), before, initial, after, its_uv, first, loop, flat, done, settled, its_changes in rows:
         report = Report(
             before=None if given is None else before,
             initial=initial,
@@ -140,5 +142,5 @@ def _results(islands, surface, start, uv, finished, converged, changes):
             mirrored=False,
             warnings=face_warnings(flat),
         )
-        results.append(Result(its_uv, report) if done else None)
+        results.append(Result(its_uv, report, [loop - first]) if done else None)
     return results

@@ -60,10 +60,11 @@ class Report:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """New UVs (n, 2) and the report on them."""
+    """New UVs (n, 2), the report on them, and the surface's boundary loops, the longest first."""
 
     uv: np.ndarray = field(repr=False)
     report: Report
+    loops: list = field(repr=False)
 
 
 def unwrap(vertices, triangles, settings=None, uv=None, pinned=None, triangulate=None):
@@ -134,7 +135,7 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
         mirrored=bool(mirrored),
         warnings=warnings + face_warnings(int(surface.degenerate.sum())),
     )
-    return Result(chosen * mirror, report)
+    return Result(chosen * mirror, report, surface.loops)
 
 
 def face_warnings(flat):

@@ -69,28 +69,42 @@ def is_injective(uv, triangles, loops):
     If every triangle follows its winding, a place is covered as often as the boundary `loops` wind around it; and that
     is once or never, where the loops are simple, meet nowhere, and the holes' lie within the outer one.
     """
-    if (orientation(uv, triangles) <= 0).any():
-        return False
+    return bool(are_injective(uv, triangles, np.zeros(len(triangles), int), loops, np.zeros(len(loops), int))[0])
+
+
+def are_injective(uv, triangles, piece, loops, loop_piece):
+    """The same for several pieces, (p,) bool; `piece` (m,) and `loop_piece` (l,) say whose a triangle or loop is."""
+    wrong = np.zeros(loop_piece.max() + 1, bool)
+    wrong[piece[orientation(uv, triangles) <= 0]] = True
+    if wrong.all():
+        return ~wrong
     stored = as_stored(uv)
     polygons = [stored[loop] for loop in loops]
     # Triangles of positive area leave the outer loop counter-clockwise and the others clockwise, if all are simple.
-    turns_left = [enclosed_area(polygon) > 0 for polygon in polygons]
-    return sum(turns_left) == 1 and count_crossings(polygons, touching=True) == 0
-
-
-def are_injective(uv, surface):
-    """The same for every piece of a surface whose pieces have one boundary loop each, (p,) bool."""
-    wrong = surface.sums((orientation(uv, surface.triangles) <= 0).astype(int)) > 0
-    stored = as_stored(uv)
-    polygons = [stored[loop] for loop in surface.loops]
-    wrong |= crossings(polygons, np.arange(len(polygons)), touching=True) > 0
-    return ~wrong
+    wrong |= np.bincount(loop_piece, enclosed_areas(polygons) > 0) != 1
+    return ~wrong & (crossings(polygons, loop_piece, touching=True) == 0)
 
 
 def enclosed_area(points):
     """Signed area within the closed polygon (n, 2), positive counter-clockwise."""
-    (x, y), (next_x, next_y) = (points - points[0]).T, (np.roll(points, -1, axis=0) - points[0]).T
-    return 0.5 * (x * next_y - y * next_x).sum()
+    return enclosed_areas([points])[0]
+
+
+def enclosed_areas(polygons):
+    """The same of every polygon, (k,)."""
+    start, following, first = _sides(polygons)
+    origin = np.repeat(start[first], np.diff(first, append=len(start)), axis=0)
+    (x, y), (next_x, next_y) = (start - origin).T, (start[following] - origin).T
+    return 0.5 * np.add.reduceat(x * next_y - y * next_x, first)
+
+
+def _sides(polygons):
+    """Where the closed polygons' sides start (n, 2), the numbers of those that follow, and of each polygon's first."""
+    size = np.array([len(points) for points in polygons])
+    first = np.cumsum(size) - size
+    following = np.arange(1, size.sum() + 1)
+    following[first + size - 1] = first
+    return np.concatenate(polygons), following, first
 
 
 def count_crossings(polygons, touching=False):
@@ -100,14 +114,9 @@ def count_crossings(polygons, touching=False):
 
 def crossings(polygons, group, touching=False):
     """The same within every group of polygons; `group` (k,) numbers that of each polygon."""
-    start = np.concatenate(polygons)
-    sizes = np.array([len(points) for points in polygons])
-    first = np.cumsum(sizes) - sizes
-    number = np.arange(len(start))
-    following = number + 1
-    following[first + sizes - 1] = first
+    start, following, first = _sides(polygons)
     end = start[following]
-    group = np.repeat(group, sizes)
+    group = np.repeat(group, np.diff(first, append=len(start)))
 
     found = np.zeros(group.max() + 1, int)
     for one, other in _near_sides(np.minimum(start, end), np.maximum(start, end), group):

@@ -2,8 +2,7 @@
 import numpy as np
 import pytest
 
-from qh_unwrap.addon.overlaps import certified, overlap, overlapping
-from qh_unwrap.core.validity import orientation
+from qh_unwrap.addon.overlaps import overlap, overlapping
 
 _TRIANGLE = np.array([[(0, 0), (1, 0), (0, 1)]], dtype=float)
 
@@ -54,41 +53,6 @@ def test_random_triangles_as_by_sampling(seed):
             if ((inside > 1e-3).all(axis=0) & (inside.sum(axis=0) < 1 - 1e-3)).any():
                 assert (i, j) in found
     assert len(found) < 30 * 29 / 2
-
-
-def strip(angle, cells=40):
-    """UVs and triangles of a strip that runs around a circle, by so much of a turn."""
-    turn = 2j * np.pi * angle * np.arange(cells + 1) / cells
-    z = np.concatenate([2 * np.exp(turn), np.exp(turn)])
-    k = np.arange(cells)
-    inner, outer = k + cells + 1, k
-    triangles = np.concatenate(
-        [np.column_stack(each) for each in ((inner, outer, outer + 1), (inner, outer + 1, inner + 1))]
-    )
-    return np.column_stack([z.real, z.imag]), triangles
-
-
-@pytest.mark.parametrize(
-    ("angle", "expected"), [(0.3, True), (0.999, True), (1.001, False), (1.5, False), (2.5, False)]
-)
-def test_strip_that_runs_into_itself_is_not_certified(angle, expected):
-    uv, triangles = strip(angle)
-    assert certified(uv, triangles) == expected
-
-
-def test_ring_is_certified():
-    uv, triangles = strip(1)
-    cells = len(triangles) // 2
-    closed = np.arange(2 * cells + 2)
-    closed[[cells, -1]] = 0, cells + 1
-    assert certified(uv, closed[triangles])
-    assert not certified(uv * (-1, 1), closed[triangles]), "flipped"
-
-
-def test_triangles_without_area_do_not_count():
-    uv, triangles = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0.5)]), np.array([(0, 1, 2), (0, 4, 3), (0, 2, 4)])
-    assert orientation(uv, triangles).tolist() == [1, 1, 0]
-    assert certified(uv, triangles)
 
 
 def test_dense_stack_is_quick():
