@@ -177,9 +177,20 @@ def test_pins_are_exact_and_pinned_islands_not_packed(run):
     assert uvs(obj).min() > 1
 
 
-@pytest.mark.parametrize("run", [native, ours])
+def stretched(**options):
+    """Native Minimum Stretch with its own remedy."""
+    return native(method='MINIMUM_STRETCH', no_flip=True, **options)
+
+
+def natives():
+    """As far as this Blender has them."""
+    has_no_flip = "no_flip" in bpy.ops.uv.unwrap.get_rna_type().properties
+    return [native, stretched] if has_no_flip else [native]
+
+
+@pytest.mark.parametrize("run", [*natives(), ours])
 def test_crossed_pins(run):
-    """Two neighbours that change places: native flips faces; ours says so if it must."""
+    """Two neighbours that change places: native flips faces, even if told not to; ours says so if it must."""
     obj = add_grid(4)
     edit_mode()
     pin(obj, {11: (0.75, 0.5), 13: (0.25, 0.5), 0: (0, 0), 24: (1, 1)})
@@ -189,12 +200,31 @@ def test_crossed_pins(run):
     if run is ours:
         (outcome,) = operators.last_outcomes
         assert outcome.error or outcome.after.flips
+        assert outcome.error or not outcome.is_clean
     else:
-        bpy.ops.object.mode_set(mode='OBJECT')
-        quads = uvs(obj).reshape(-1, 4, 2)
-        x, y = quads.transpose(2, 0, 1)
-        areas = (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
-        assert (areas <= 0).any()
+        assert (quad_areas(obj) <= 0).any()
+
+
+@pytest.mark.parametrize("run", [*natives()[1:], ours])
+def test_pins_that_swap_two_corners(run):
+    """Native sends all UVs to (0, 0); ours keeps the pins, and says that they cross."""
+    obj = add_grid(4)
+    edit_mode()
+    places = {0: (1, 1), 4: (1, 0), 20: (0, 1), 24: (0, 0)}
+    pin(obj, places)
+    assert run() == {'FINISHED'}
+    if run is ours:
+        assert {vertex: place_of(obj, vertex) for vertex in places} == places
+        (outcome,) = operators.last_outcomes
+        assert not outcome.is_clean
+        assert "the pins make the outline cross itself: unpin some, or move them" in outcome.messages()
+    else:
+        assert not uvs(obj).any()
+
+
+def quad_areas(obj):
+    x, y = uvs(obj).reshape(-1, 4, 2).transpose(2, 0, 1)
+    return (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1) / 2
 
 
 @pytest.mark.parametrize("run", [native, ours])
