@@ -13,12 +13,16 @@ class MemoryNeededError(UnwrapError):
     """The island needs more memory than is free."""
 
 
+def suffices(vertices, free):
+    """Whether the `free` bytes, None if these are not known, are enough for an island of so many vertices."""
+    return free is None or vertices * _PER_VERTEX <= free
+
+
 def check(vertices, free):
-    """Raise `MemoryNeededError` if so many vertices need more than the `free` bytes, None if these are not known."""
-    needed = vertices * _PER_VERTEX
-    if free is not None and needed > free:
+    """Raise `MemoryNeededError` if they are not."""
+    if not suffices(vertices, free):
         raise MemoryNeededError(
-            f"it needs about {needed / 1e9:.1f} GB of memory and {free / 1e9:.1f} GB are free:"
+            f"it needs about {vertices * _PER_VERTEX / 1e9:.1f} GB of memory and {free / 1e9:.1f} GB are free:"
             " mark seams to cut it into smaller islands, or close other programs"
         )
 

@@ -20,6 +20,7 @@ from .selection import Target
 
 _FIXED = 300  # vertices that take as long as what an island takes whatever its size
 _LEFT = 0.9  # of an island after each iteration, by and large
+_TOGETHER = 0.5  # of the work is that on small islands, if there are any
 
 
 @dataclass
@@ -123,20 +124,7 @@ def unwrap_targets(targets, settings, options, context):
     for target in targets:
         yield 0.0
         works += _works(target, settings, options)
-    sizes = np.array([_FIXED + len(work.island.vertices) for work in works])
-    for done in _unwrap_together(works):
-        yield sizes[:done].sum() / sizes.sum() / 2
-    for done, size, work in zip(np.cumsum(sizes) - sizes, sizes, works, strict=True):
-        if work.uv is not None:
-            continue
-        try:
-            yield done / sizes.sum()
-            for iteration in _unwrap(work):
-                yield (done + size * (1 - _LEFT**iteration)) / sizes.sum()
-        except UnwrapError as error:
-            work.outcome.error = str(error)
-        except MemoryError:
-            work.outcome.error = "the memory ran out: mark seams to cut it into smaller islands"
+    yield from _unwrap_all(works)
     yield 1.0
     if not all(mesh_arrays.is_as_read(work.target.obj, work.mesh) for work in works):
         for work in works:
@@ -167,26 +155,43 @@ def _works(target, settings, options):
         yield _Work(target, mesh, island, outcome, settings, hanging)
 
 
+def _unwrap_all(works):
+    """Unwrap the small ones together and the others one by one; yields the share that is done."""
+    share = 0.0
+    for share in _unwrap_together(works):
+        yield share
+    works = [work for work in works if work.uv is None]
+    sizes = np.array([_FIXED + len(work.island.vertices) for work in works])
+    left = (1 - share) / max(sizes.sum(), 1)
+    for done, size, work in zip(np.cumsum(sizes) - sizes, sizes, works, strict=True):
+        try:
+            yield share + left * done
+            for iteration in _unwrap(work):
+                yield share + left * (done + size * (1 - _LEFT**iteration))
+        except UnwrapError as error:
+            work.outcome.error = str(error)
+        except MemoryError:
+            work.outcome.error = "the memory ran out: mark seams to cut it into smaller islands"
+
+
 def _unwrap_together(works):
-    """Unwrap what is small and hangs on nothing, all at once; yields the number of works looked at so far."""
+    """Unwrap what is small and free, all at once; yields the share that is done then, if others are left."""
+    free_memory = memory.free()
+    works = [work for work in works if work.is_free and memory.suffices(len(work.vertices), free_memory)]
     if not works:
         return
-    suiting = [k for k, work in enumerate(works) if work.is_free]
-    islands = []
-    for k in suiting:
-        work = works[k]
-        uv = work.old_uv
-        islands.append((work.vertices, work.triangles, None if uv is None or work.is_cut else uv))
+    old = [None if work.old_uv is None or work.is_cut else work.old_uv for work in works]
+    islands = [(work.vertices, work.triangles, uv) for work, uv in zip(works, old, strict=True)]
     steps = unwrap_together(islands, works[0].settings)
     while True:
         try:
-            yield suiting[next(steps) - 1] + 1
+            yield _TOGETHER * next(steps) / len(works)
         except StopIteration as stop:
             results = stop.value
             break
-    for k, result in zip(suiting, results, strict=True):
+    for work, result in zip(works, results, strict=True):
         if result is not None:
-            _keep(works[k], result)
+            _keep(work, result)
 
 
 def _unwrap(work):

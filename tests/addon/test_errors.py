@@ -174,7 +174,7 @@ def test_loose_vertices_and_a_face_without_area():
     obj.data.update()
     assert bpy.ops.uv.qh_unwrap() == {'FINISHED'}
     (outcome,) = operators.last_outcomes
-    assert outcome.warnings == ("1 faces have zero area",) and outcome.after.flips == 0
+    assert outcome.warnings == ("1 face has zero area",) and outcome.after.flips == 0
 
 
 # Files that are broken

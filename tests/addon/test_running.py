@@ -14,7 +14,7 @@ from scenes import add_cube, add_grid, changes, edit_mode, snapshot, uvs
 from qh_unwrap.addon import operators, running, selection, unwrapping
 from qh_unwrap.addon.options import MeshOptions
 from qh_unwrap.addon.running import InSteps, Run
-from qh_unwrap.core import Settings
+from qh_unwrap.core import Settings, together
 
 TIMER = SimpleNamespace(type='TIMER', value='NOTHING')
 ESC = SimpleNamespace(type='ESC', value='PRESS')
@@ -92,6 +92,12 @@ def _no_outcomes():
     operators.last_outcomes.clear()
 
 
+@pytest.fixture(autouse=True)
+def _one_by_one(monkeypatch):
+    """Islands are unwrapped one by one, however small."""
+    monkeypatch.setattr(together, "_SMALL", 0)
+
+
 def begun(**arguments):
     """An operator that has been invoked, and is not finished."""
     operator, context = Unwrapping(**arguments), Context()
@@ -154,7 +160,8 @@ def test_share_grows_to_one():
     for obj in bpy.context.scene.objects:
         obj.select_set(True)
     targets = selection.targets(bpy.context)
-    shares = list(unwrapping.unwrap_targets(targets, Settings(), MeshOptions(), bpy.context))
+    settings = Settings(refine=0, tolerance=0)
+    shares = list(unwrapping.unwrap_targets(targets, settings, MeshOptions(), bpy.context))
     assert len(targets) == 3 and shares == sorted(shares) and shares[0] == 0 and shares[-1] == 1
     assert len(np.unique(shares)) > 8
 
@@ -238,6 +245,27 @@ def test_swallows_everything_else(slow):
     assert operator.modal(context, SimpleNamespace(type='ESC', value='RELEASE')) == {'RUNNING_MODAL'}
     assert context.window.progress == share, "and does no work for it"
     assert operator.modal(context, ESC) == {'CANCELLED'}
+
+
+def test_small_islands_are_done_together_and_can_be_cancelled(slow, monkeypatch):
+    monkeypatch.setattr(together, "_SMALL", 8)
+    monkeypatch.setattr(together, "_AT_ONCE", 16)
+    alone = []
+    monkeypatch.setattr(unwrapping, "unwrap_steps", lambda *_, **__: alone.append(1) or iter(()))
+    obj = add_grid(6, uv=False)
+    for edge in obj.data.edges:  # every face an island
+        edge.use_seam = True
+    start = everything([obj])
+    operator, context = begun()
+    shares = []
+    for _ in range(4):
+        operator.modal(context, TIMER)
+        shares.append(context.window.progress)
+    assert len(set(shares)) > 2 and not alone
+    assert operator.modal(context, ESC) == {'CANCELLED'}
+    assert context.window.is_clean and everything([obj]) == start
+    assert bpy.ops.uv.qh_unwrap() == {'FINISHED'} and not alone
+    assert len(operators.last_outcomes) == 36 and all(outcome.is_clean for outcome in operators.last_outcomes)
 
 
 @pytest.mark.parametrize("start", ["execute", "invoke"])
