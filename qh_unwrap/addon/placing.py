@@ -52,11 +52,14 @@ def upright(islands):
     total = np.add.reduceat(weight, starts)
     centre = np.add.reduceat(weight[:, None] * corners.mean(axis=1), starts) / total[:, None]
     size = np.sqrt(areas([(vertices, its) for _, vertices, its, _ in islands]) / total)
-    offset = (corners - centre[piece, None]) * size[piece, None, None]
+    x, y = ((corners - centre[piece, None]) * size[piece, None, None]).transpose(2, 1, 0)
     # The slope of the height over the layout, by least squares.
-    spread = np.add.reduceat(np.einsum("t,tci,tcj->tij", weight, offset, offset), starts)
-    moment = np.add.reduceat(np.einsum("t,tci,tc->ti", weight, offset, heights), starts)
-    slope = (np.linalg.pinv(spread) @ moment[:, :, None])[:, :, 0]
+    xx, xy, yy, xh, yh = (
+        np.add.reduceat(weight * (one * other).sum(axis=0), starts)
+        for one, other in ((x, x), (x, y), (y, y), (x, heights.T), (y, heights.T))
+    )
+    spread = np.moveaxis(np.array([[xx, xy], [xy, yy]]), 2, 0)
+    slope = (np.linalg.pinv(spread) @ np.column_stack([xh, yh])[:, :, None])[:, :, 0]
     steepness = np.linalg.norm(slope, axis=1)
     turned = []
     for uv, steep, way in zip(uvs, steepness > _STEEPEST_FLAT, slope @ (1, 1j), strict=True):

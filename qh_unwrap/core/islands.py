@@ -54,37 +54,37 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
     triangle_face = corner_face[corner_triangles[:, 0]]
     chosen_triangles = np.flatnonzero(selected[triangle_face])
 
-    # The islands' vertices: those of one follow one another
-    corners, _ = _grouped(chosen_corners, corner_rank)
-    key = corner_rank[corners] * corner_count + uv_vertex[corners]
-    key, example, vertex = np.unique(key, return_index=True, return_inverse=True)
-    first_vertex = np.searchsorted(key, np.arange(len(first)) * corner_count)
-    island_vertex = np.zeros(corner_count, dtype=np.intp)
-    island_vertex[corners] = vertex - first_vertex[corner_rank[corners]]
+    # UV vertices, those of one island after another
+    rank_of = np.full(uv_vertex.max(initial=-1) + 1, -1)
+    rank_of[uv_vertex[chosen_corners]] = corner_rank[chosen_corners]
+    used, first_vertex = _grouped(np.flatnonzero(rank_of >= 0), rank_of)
+    number = np.zeros(len(rank_of), dtype=np.intp)
+    number[used] = np.arange(len(used)) - first_vertex[rank_of[used]]
+    island_vertex = number[uv_vertex]
+    mesh_vertex = np.zeros(len(rank_of), dtype=np.intp)
+    mesh_vertex[uv_vertex[chosen_corners]] = corner_vertex[chosen_corners]
 
     crowded = (np.bincount(corner_edge[chosen_corners], minlength=len(seam)) > 2) & ~seam
     crowded_corners = chosen_corners[crowded[corner_edge[chosen_corners]]]
     pairs = np.unique(corner_rank[crowded_corners] * len(seam) + corner_edge[crowded_corners])
     crowded_edges = np.bincount(pairs // max(len(seam), 1), minlength=len(first)).tolist()
 
-    def split(items, rank):
-        items, starts = _grouped(items, rank)
-        return np.split(items, starts[1:]) if len(items) else []
+    def split(values, starts):
+        return np.split(values, starts[1:]) if len(first) else []
 
-    triangles, starts = _grouped(chosen_triangles, face_rank[triangle_face])
-    triangle_corners = np.split(corner_triangles[triangles], starts[1:]) if len(first) else []
-    vertices = np.split(corner_vertex[corners[example]], first_vertex[1:]) if len(first) else []
-    return [
-        Island(own_faces, own_corners, island_vertex[own_corners], own_vertices, island_vertex[own], own, edges)
-        for own_faces, own_corners, own_vertices, own, edges in zip(
-            split(chosen, face_rank),
-            split(chosen_corners, corner_rank),
-            vertices,
-            triangle_corners,
-            crowded_edges,
-            strict=True,
-        )
-    ]
+    faces, face_starts = _grouped(chosen, face_rank)
+    corners, corner_starts = _grouped(chosen_corners, corner_rank)
+    triangles, triangle_starts = _grouped(chosen_triangles, face_rank[triangle_face])
+    columns = {
+        "faces": split(faces, face_starts),
+        "corners": split(corners, corner_starts),
+        "corner_vertex": split(island_vertex[corners], corner_starts),
+        "vertices": split(mesh_vertex[used], first_vertex),
+        "triangles": split(island_vertex[corner_triangles[triangles]], triangle_starts),
+        "triangle_corners": split(corner_triangles[triangles], triangle_starts),
+        "crowded_edges": crowded_edges,
+    }
+    return [Island(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
 
 
 def cuts(corner_vertex, corner_edge, face_start, edge_count, uv, tolerance=1e-6):

@@ -137,42 +137,43 @@ def nested_dissection(points, edges):
     n, axes = points.shape
     if len(edges) and n <= _FEW:
         return banded(n, edges)
-    piece = np.zeros(n, dtype=np.int64)  # -1 once in a separator
+    piece = np.zeros(n, dtype=np.int32)  # -1 once in a separator
     key = np.zeros(n, dtype=np.int64)  # one base-3 digit a level: first half 0, second half 1, separator 2
     orders = [np.argsort(points[:, axis], kind="stable") for axis in range(axes)]
+    i, j = edges.T.astype(np.int32)
     for _ in range(max(0, int(np.ceil(np.log2(max(n, 1) / _LEAF))))):
-        half, orders = _halves(piece, orders, edges)
-        i, j = edges.T
+        half, orders = _halves(piece, orders, i, j)
         cut = half[i] != half[j]
-        separator = _vertex_cover(edges[cut], half)
-        key *= 3
+        crossing = np.flatnonzero(cut)
+        separator = _vertex_cover(np.column_stack([i[crossing], j[crossing]]), half)
         inside = piece >= 0
-        key[inside] += half[inside]
+        key *= 3
+        key += np.where(inside, half, 0)
         key[separator] += 2 - half[separator]
-        piece = np.where(inside, 2 * piece + half, -1)
+        piece = np.where(inside, 2 * piece + half, -1).astype(np.int32)
         piece[separator] = -1
-        edges = edges[~cut & (piece[i] >= 0) & (piece[j] >= 0)]
+        kept = np.flatnonzero(~cut & (piece[i] >= 0) & (piece[j] >= 0))
+        i, j = i[kept], j[kept]
     return np.argsort(key, kind="stable")
 
 
-def _halves(piece, orders, edges):
+def _halves(piece, orders, i, j):
     """Which half (0 or 1) of its piece each vertex falls in; and `orders`, sorted by piece as well."""
-    count = piece.max(initial=0) + 1
-    edge_piece = piece[edges[:, 0]]
-    candidates, cuts = [], []
-    grouped = []
+    size = np.bincount(piece[piece >= 0], minlength=1)
+    place = np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
+    second = 2 * place >= np.repeat(size, size)
+    edge_piece = piece[i]
+    candidates, cuts, grouped = [], [], []
     for order in orders:
-        order = order[piece[order] >= 0]
-        order = order[np.argsort(piece[order], kind="stable")]
-        grouped.append(order)
         own = piece[order]
-        size = np.bincount(own, minlength=count)
-        first = np.cumsum(size) - size
-        half = np.zeros(len(piece), dtype=np.int64)
-        half[order] = 2 * (np.arange(len(order)) - first[own]) >= size[own]
-        crossing = half[edges[:, 0]] != half[edges[:, 1]]
+        inside = own >= 0
+        order = order[inside]
+        order = order[np.argsort(own[inside], kind="stable")]
+        grouped.append(order)
+        half = np.zeros(len(piece), dtype=np.int8)
+        half[order] = second
         candidates.append(half)
-        cuts.append(np.bincount(edge_piece[crossing], minlength=count))
+        cuts.append(np.bincount(edge_piece[half[i] != half[j]], minlength=len(size)))
     best = np.argmin(cuts, axis=0)
     return np.choose(best[np.maximum(piece, 0)], candidates), grouped
 
