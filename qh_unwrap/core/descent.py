@@ -19,7 +19,10 @@ _SMALLEST = 1e-9  # eigenvalue of the Hessian's triangles
 _LONGEST = 0.9  # of the step at which a triangle collapses
 _ARMIJO = 1e-4
 _HALVINGS = 20
-_NEGLIGIBLE = 1e-3  # a decrease of the energy by this part of it is not worth a step
+_NEGLIGIBLE = 1e-3  # a decrease of the energy by this part of it is not worth a step,
+_LITTLE = 1e-2  # nor one by this part of what it lies above its least value, 1
+_INVISIBLE = 1e-6  # a decrease that nobody could see
+_RESIDUAL = 0.03  # of Newton's equations, by the gradient
 
 
 def descend(domain, balance, steps, uv):
@@ -52,7 +55,8 @@ def descend(domain, balance, steps, uv):
             if steep.all():
                 return
         uv = uv + length[surface.vertex_piece, None] * direction
-        done = (length == 0) | (start - value < _NEGLIGIBLE * start)
+        worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
+        done = (length == 0) | (start - value < worth)
         yield uv, done
         if done.all():
             return
@@ -87,6 +91,11 @@ class _Energy:
         self._weight = weight / np.add.reduceat(weight, self._starts)[self.piece]
         if air.any():  # there is one piece
             self._weight[air] = _AIR * self.value(self.jacobian(uv)) / air.sum()
+
+    @property
+    def least(self):
+        """Its least possible value, where every triangle keeps its shape, (p,)."""
+        return np.add.reduceat(self._weight, self._starts)
 
     def jacobian(self, uv):
         """The map's derivative in every triangle, (2, 2, m)."""
@@ -206,5 +215,6 @@ def _newton_direction(domain, energy, jacobian):
     beside = np.array([[mean + difference, symmetric - anti], [symmetric + anti, mean - difference]])[:, :, inner]
     forward, backward = beside.transpose(2, 0, 1), beside.transpose(2, 1, 0)
     direction = np.zeros((n, 2))
-    direction[free] = -dirichlet.system.solve_blocks(forward, backward, diagonal.transpose(2, 0, 1), gradient[free])
+    blocks = forward, backward, diagonal.transpose(2, 0, 1)
+    direction[free] = -dirichlet.system.solve_blocks(*blocks, gradient[free], _RESIDUAL)
     return gradient, direction

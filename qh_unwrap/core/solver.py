@@ -6,7 +6,6 @@ from scipy.sparse import bsr_array, coo_array, csc_array
 from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mckee
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
-_ROUGHLY = 0.3  # the residual by the right-hand side that is small enough for a step of descent
 _STEPS = 100
 _LEAF = 8
 _FEW = 300  # vertices whose order hardly matters
@@ -44,8 +43,8 @@ class System:
 
         return solve
 
-    def solve_blocks(self, forward, backward, diagonal, rhs):
-        """Solve roughly, for right-hand sides (n, 2) and a symmetric positive definite matrix of blocks (2, 2).
+    def solve_blocks(self, forward, backward, diagonal, rhs, residual):
+        """Solve a symmetric positive definite system of blocks (2, 2) until a `residual` by that part of `rhs` (n, 2).
 
         Conjugate gradients, with the mean of both coordinates' own matrices as preconditioner.
         """
@@ -56,8 +55,8 @@ class System:
             self._entry
         ]  # the pattern is by columns, blocks by rows
         matrix = bsr_array((entries, self._indices, self._indptr), shape=(2 * n, 2 * n))
-        mean = LinearOperator(matrix.shape, lambda residual: factors.solve(residual.reshape(-1, 2)).ravel())
-        solution, _ = cg(matrix, rhs[self._order].ravel(), rtol=_ROUGHLY, maxiter=_STEPS, M=mean)
+        mean = LinearOperator(matrix.shape, lambda rest: factors.solve(rest.reshape(-1, 2)).ravel())
+        solution, _ = cg(matrix, rhs[self._order].ravel(), rtol=residual, maxiter=_STEPS, M=mean)
         result = np.empty_like(rhs)
         result[self._order] = solution.reshape(-1, 2)
         return result
