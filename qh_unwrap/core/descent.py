@@ -19,6 +19,7 @@ _SMALLEST = 1e-9  # eigenvalue of the Hessian's triangles
 _LONGEST = 0.9  # of the step at which a triangle collapses
 _ARMIJO = 1e-4
 _HALVINGS = 20
+_AT_ONCE = 8192  # triangles
 _NEGLIGIBLE = 1e-3  # a decrease of the energy by this part of it is not worth a step,
 _LITTLE = 1e-2  # nor one by this part of what it lies above its least value, 1
 _INVISIBLE = 1e-6  # a decrease that nobody could see
@@ -127,6 +128,14 @@ class _Energy:
 
         The rows (mean, difference, symmetric, antisymmetric) make up the blocks [[m + d, s - a], [s + a, m - d]].
         """
+        m = jacobian.shape[2]
+        gradient, blocks = np.empty((2, 3, m)), np.empty((4, 3, m))
+        for start in range(0, m, _AT_ONCE):  # what is at work stays in the processor's cache
+            part = slice(start, start + _AT_ONCE)
+            gradient[..., part], blocks[..., part] = self._derivatives(jacobian[..., part], part)
+        return gradient, blocks
+
+    def _derivatives(self, jacobian, part):
         p, r = self._powers
         (a, b), (c, d) = jacobian
         # Singular values in closed form, and the angles of the singular vectors
@@ -138,7 +147,7 @@ class _Energy:
         size, square = s1 * s1 + s2 * s2, det * det
         beta, gamma = (square - 1) / (square + 1), 4 * square / (square + 1) ** 2
 
-        density = self._weight * (size / (2 * det)) ** p * ((det + 1 / det) / 2) ** r
+        density = self._weight[part] * (size / (2 * det)) ** p * ((det + 1 / det) / 2) ** r
         g1 = p * (2 * s1 / size - 1 / s1) + r * beta / s1  # logarithmic derivatives
         g2 = p * (2 * s2 / size - 1 / s2) + r * beta / s2
         f11 = g1 * g1 + p * (2 / size - 4 * (s1 / size) ** 2 + 1 / s1**2) + r * (gamma - beta) / s1**2
@@ -153,13 +162,8 @@ class _Energy:
 
         # The hats' gradients along the right singular vectors: h of the corners, k of the next ones
         cos, sin = np.cos(right), np.sin(right)
-        h1, h2 = (
-            _with_first(each)
-            for each in (
-                self._hats[:, 0] * cos - self._hats[:, 1] * sin,
-                self._hats[:, 0] * sin + self._hats[:, 1] * cos,
-            )
-        )
+        x, y = self._hats[:, 0, part], self._hats[:, 1, part]
+        h1, h2 = _with_first(x * cos - y * sin), _with_first(x * sin + y * cos)
         k1, k2 = np.roll(h1, -1, axis=0), np.roll(h2, -1, axis=0)
         cos, sin = np.cos(left), np.sin(left)
         along, across = density * g1 * h1, density * g2 * h2
