@@ -5,6 +5,7 @@ import traceback
 from time import perf_counter
 
 _AT_ONCE = 0.5  # seconds: what takes no longer ends before anyone could look
+_DRAWS = 2  # of the window before the work goes on: in the first, the menu still stands there
 _SLICE = 0.1  # seconds of work between two looks at what the person does
 
 
@@ -41,6 +42,7 @@ class InSteps:
     """
 
     _run = _timer = None
+    _undrawn = 0
 
     def execute(self, context):
         steps = self.begin(context)
@@ -63,6 +65,7 @@ class InSteps:
         if run.advance(_AT_ONCE):
             return self.finish(run.result)
         window_manager = context.window_manager
+        self._undrawn = _DRAWS
         self._run, self._timer = run, window_manager.event_timer_add(0.01, window=context.window)
         window_manager.progress_begin(0, 1)
         window_manager.modal_handler_add(self)
@@ -76,6 +79,10 @@ class InSteps:
             self.report({'INFO'}, "Cancelled: nothing was changed")
             return {'CANCELLED'}
         if event.type != 'TIMER':
+            return {'RUNNING_MODAL'}
+        if self._undrawn:
+            self._undrawn -= 1
+            self._show(context)
             return {'RUNNING_MODAL'}
         try:
             finished = self._run.advance(_SLICE)

@@ -85,6 +85,7 @@ def slow(monkeypatch):
     """Every step takes longer than the moment that it has."""
     monkeypatch.setattr(running, "_AT_ONCE", 0)
     monkeypatch.setattr(running, "_SLICE", 0)
+    monkeypatch.setattr(running, "_DRAWS", 0)
 
 
 @pytest.fixture(autouse=True)
@@ -234,6 +235,18 @@ def test_esc_cancels_and_changes_nothing(slow, steps):
     assert everything(objects) == start
     assert not operators.last_outcomes
     assert bpy.ops.uv.qh_unwrap() == {'FINISHED'}, "and it can be done again"
+
+
+def test_window_is_drawn_before_the_work_goes_on(slow, monkeypatch):
+    monkeypatch.setattr(running, "_DRAWS", 2)
+    add_grid(4)
+    operator, context = begun()
+    worked = []
+    monkeypatch.setattr(Run, "advance", lambda _run, seconds: worked.append(seconds))
+    for expected in (0, 0, 1, 2):
+        assert operator.modal(context, TIMER) == {'RUNNING_MODAL'}
+        assert len(worked) == expected
+    operator.cancel(context)
 
 
 def test_swallows_everything_else(slow):

@@ -134,7 +134,8 @@ def _long_work(gui):
     _add(gui, _sheet(388), lambda one, other: False)
     yield 5
     yield from _begin(gui)
-    yield 1
+    for _ in range(4):  # until it is drawn without the menu
+        yield 0.5
     gui.shot("15_running.png")
     gui.key("g")
     yield 0.5
