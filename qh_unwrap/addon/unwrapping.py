@@ -189,6 +189,8 @@ def _unwrap_together(works):
         except StopIteration as stop:
             results = stop.value
             break
+        except MemoryError:  # there may be enough for one at a time
+            return
     for work, result in zip(works, results, strict=True):
         if result is not None:
             _keep(work, result)

@@ -92,7 +92,7 @@ def _pinned_corners(loop, pinned):
     corners = np.flatnonzero(pinned[loop])
     if len(corners) != 4 or pinned.sum() != 4:
         raise PinError(
-            f"a rectangle takes its corners from four pinned vertices of the outline, and {pinned.sum()} are pinned,"
+            f"a rectangle takes its corners from four pinned vertices of the outline, not {pinned.sum()},"
             f" {len(corners)} of them on the outline: pin four, or none"
         )
     return corners
@@ -192,7 +192,8 @@ def _kept(surface, uv, pinned):
     crossings = count_crossings([uv[loop] for loop in surface.loops])
     if crossings:
         raise BoundaryError(
-            f"the UVs' outline crosses itself {crossings} times: untangle it, or choose another boundary"
+            f"the UVs' outline crosses itself {'once' if crossings == 1 else f'{crossings} times'}:"
+            " untangle it, or choose another boundary"
         )
     return held if pinned is None else held | pinned
 

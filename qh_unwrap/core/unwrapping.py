@@ -92,7 +92,7 @@ def unwrap(vertices, triangles, settings=None, uv=None, pinned=None, triangulate
 
 
 def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, triangulate=None):
-    """Like `unwrap`, as a generator that yields a `State` after each iteration and returns the `Result`."""
+    """Like `unwrap`, as a generator: yields the initial `State` and that after each iteration, returns the `Result`."""
     settings = settings or Settings()
     check_settings(settings)
     surface = Surface(vertices, triangles)
@@ -120,7 +120,8 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
         except StopIteration as stop:
             uv, converged = stop.value
             break
-        changes.append(state.change)
+        if state.iteration:
+            changes.append(state.change)
         yield replace(state, uv=state.uv[:n] * mirror)
     chosen = placed(uv[:n])
 
@@ -144,7 +145,7 @@ def face_warnings(flat):
 
 
 def _improved(surface, domain, settings, start, placed):
-    """Iterate and refine; yields a `State` after each step and returns the best map and whether it converged.
+    """Iterate and refine; yields a `State` before and after each step, returns the best map and whether it converged.
 
     Where it matters that a map is valid, it matters where `placed` puts it.
     """
@@ -152,8 +153,7 @@ def _improved(surface, domain, settings, start, placed):
     refining = settings.refine and settings.iterations and settings.weights == "COTANGENT"
     best, least = None, np.inf
     for state in iterate(domain, settings, start, n):
-        if state.iteration:
-            yield state
+        yield state
         # Repairs and new air make the energy rise and fall: keep the best valid map from then on.
         uneven = state.repaired or refining or settings.boundary == "FREE"
         if state.valid and not invalid(surface, placed(state.uv[:n])).any():

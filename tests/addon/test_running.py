@@ -313,7 +313,7 @@ def test_memory_that_runs_out_fails_the_island_alone(slow, monkeypatch):
     original = unwrapping.unwrap_steps
 
     def steps(vertices, *arguments, **keywords):
-        yield SimpleNamespace(iteration=1)
+        yield SimpleNamespace(iteration=0)
         if len(vertices) == 25:
             raise MemoryError
         return (yield from original(vertices, *arguments, **keywords))

@@ -99,8 +99,7 @@ def final_map(mesh, uv=None, **settings):
 def maps(mesh, uv=None, **settings):
     """The start (n, 2) and the map after each of exactly `iterations`, as a list; otherwise like `final_map`."""
     settings = {**EXACT, **settings}
-    start = unwrap(*mesh, Settings(**{**settings, "iterations": 0}), uv).uv
-    return [start, *(state.uv for state in unwrap_steps(*mesh, Settings(**settings), uv))]
+    return [state.uv for state in unwrap_steps(*mesh, Settings(**settings), uv)]
 
 
 def distance(uv, other):

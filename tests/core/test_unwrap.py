@@ -175,8 +175,9 @@ def test_iteration_lowers_stretch_and_stops_when_it_no_longer_changes():
 def test_steps_show_every_iteration_and_can_be_abandoned():
     vertices, triangles = shapes.hemisphere()
     steps = unwrap_steps(vertices, triangles, Settings(boundary="CIRCLE", iterations=4, tolerance=0, refine=0))
-    first = next(steps)
-    assert first.iteration == 1 and first.uv.shape == (len(vertices), 2) and 0 < first.change < 1
+    start, first = next(steps), next(steps)
+    assert start.iteration == 0 and first.iteration == 1
+    assert first.uv.shape == (len(vertices), 2) and 0 < first.change < 1
     steps.close()
     steps = unwrap_steps(vertices, triangles, Settings(boundary="CIRCLE", iterations=4, tolerance=0, refine=0))
     seen = []
@@ -186,7 +187,7 @@ def test_steps_show_every_iteration_and_can_be_abandoned():
         except StopIteration as stop:
             result = stop.value
             break
-    assert [state.iteration for state in seen] == [1, 2, 3, 4]
+    assert [state.iteration for state in seen] == [0, 1, 2, 3, 4]
     np.testing.assert_array_equal(seen[-1].uv, result.uv)
 
 
