@@ -208,7 +208,12 @@ def islands_of_20(arguments, verdicts):
     verdicts.claim(
         f"{len(surfaces)} islands of 20 triangles: all certified, and no more distortion than {STRETCH_10}",
         ours["certified"] == len(surfaces) and ours["energy"] <= native["energy"],
-        f"{ours['seconds']:.2f} s, {STRETCH_10} {native['seconds']:.2f} s",
+        f"energies {ours['energy']:.6f} and {native['energy']:.6f}",
+    )
+    verdicts.claim(
+        f"{len(surfaces)} islands of 20 triangles: no slower than {STRETCH_10}",
+        ours["seconds"] <= native["seconds"],
+        f"{ours['seconds']:.2f} s, {native['seconds']:.2f} s",
     )
     return found
 
