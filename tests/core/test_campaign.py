@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from ..benchmarks.campaign_free import overlapping, unwrapped
+from ..benchmarks.campaign_free import overlapping, together, unwrapped
 from .patches import Patches
 
 PATCHES = 120
@@ -22,6 +22,8 @@ def test_certified_maps_of_random_patches_are_clean(patches):
     assert not [case for case in cases if case.certified and not case.clean]
     assert not [case for case in cases if case.clean and not case.certified]
     assert not [case for case in cases if not case.certified]
+    joined = together(cases)
+    assert len(joined) > PATCHES / 2 and all(case.certified and case.clean for case in joined)
 
 
 def test_maps_that_overlap_are_not_certified(patches):
