@@ -44,7 +44,7 @@ class Surface:
     """
 
     def __init__(self, vertices, triangles, vertex_starts=(0,), triangle_starts=(0,)):
-        vertices, triangles = _checked_arrays(vertices, triangles)
+        vertices, triangles = checked_arrays(vertices, triangles)
         self.triangles = triangles
         self.vertex_starts, self.triangle_starts = np.asarray(vertex_starts), np.asarray(triangle_starts)
         self.vertex_piece = _numbered(self.vertex_starts, len(vertices))
@@ -257,7 +257,8 @@ class Surface:
         return np.where(self.air[:, None, None], uv[self.triangles], self.flat)
 
 
-def _checked_arrays(vertices, triangles):
+def checked_arrays(vertices, triangles):
+    """Both as arrays of finite floats (n, 3) and of indices (m, 3); raises `SurfaceError`."""
     try:
         vertices = np.ascontiguousarray(vertices, dtype=np.float64)
         indices = np.asarray(triangles)

@@ -5,16 +5,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from . import locality
 from .boundary import held_vertices, outer_loop
 from .descent import descend
 from .distortion import Distortion, checked_uv, measure
-from .errors import BoundaryError, PinError, UVError
+from .errors import BoundaryError, PinError, SurfaceError, UVError
 from .exterior import Exterior
 from .initial import conformal, fit, initial_map, project
 from .quasi_harmonic import Held, State, check_settings, diameter, energy, iterate
 from .settings import Settings
 from .solver import Dirichlet
-from .surface import Surface
+from .surface import Surface, checked_arrays
 from .validity import enclosed_area, invalid, is_injective
 
 _HANDOVER = 0.9  # an iteration that lowers the energy by less than this part of it gives way to the refinement
@@ -93,6 +94,24 @@ def unwrap(vertices, triangles, settings=None, uv=None, pinned=None, triangulate
 
 def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, triangulate=None):
     """Like `unwrap`, as a generator: yields the initial `State` and that after each iteration, returns the `Result`."""
+    vertices, triangles = checked_arrays(vertices, triangles)
+    n = len(vertices)
+    if n <= locality.MANY or any(each is not None and np.shape(each)[:1] != (n,) for each in (uv, pinned)):
+        return (yield from _steps(vertices, triangles, settings, uv, pinned, triangulate))
+    mesh = locality.Sorted(vertices, triangles)
+    steps = _steps(mesh.vertices, mesh.triangles, settings, mesh.sorted(uv), mesh.sorted(pinned), triangulate)
+    while True:
+        try:
+            state = next(steps)
+        except StopIteration as stop:
+            return mesh.restored_result(stop.value)
+        except SurfaceError as error:
+            error.triangles = mesh.own_triangles(np.asarray(error.triangles, dtype=int))
+            raise
+        yield replace(state, uv=mesh.restored(state.uv))
+
+
+def _steps(vertices, triangles, settings, uv, pinned, triangulate):
     settings = settings or Settings()
     check_settings(settings)
     surface = Surface(vertices, triangles)

@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qh_unwrap.core import Settings, UnwrapError, distortion, errors, unwrap, unwrap_steps
+from qh_unwrap.core import Settings, Surface, UnwrapError, distortion, errors, locality, unwrap, unwrap_steps
+from qh_unwrap.core.distortion import measure
 from qh_unwrap.core.initial import fit
+from qh_unwrap.core.validity import is_injective
 
 from . import shapes
 from .blender import triangulate
@@ -293,3 +295,31 @@ def test_the_report_is_plain_data():
     assert again["after"]["l2_stretch"] == report.after.l2_stretch
     assert again["iterations"] == len(again["changes"])
     assert issubclass(UnwrapError, ValueError)
+
+
+def test_large_meshes_are_sorted_and_their_results_put_back(monkeypatch):
+    vertices, triangles = shapes.bump(8, inner=300, outer=60)
+    uv = vertices[:, :2] * [1.5, 1]
+    pinned = np.zeros(len(uv), bool)
+    pinned[[3, 50]] = True
+    plain = unwrap(vertices, triangles, Settings(), uv, pinned, triangulate)
+    monkeypatch.setattr(locality, "MANY", 100)
+    steps = unwrap_steps(vertices, triangles, Settings(), uv, pinned, triangulate)
+    start = next(steps)
+    np.testing.assert_array_equal(start.uv[pinned], uv[pinned])
+    result = unwrap(vertices, triangles, Settings(), uv, pinned, triangulate)
+    np.testing.assert_allclose(result.uv, plain.uv, atol=1e-3)
+    np.testing.assert_array_equal(result.uv[pinned], uv[pinned])
+    surface = Surface(vertices, triangles)
+    for loop, other in zip(result.loops, surface.loops, strict=True):
+        assert set(loop) == set(other) and is_injective(result.uv, triangles, [loop])
+    for measured, of in ((result.report.before, uv), (result.report.after, result.uv)):
+        for name in ("triangle_stretch", "triangle_angle", "triangle_log_area", "triangle_orientation"):
+            np.testing.assert_allclose(
+                getattr(measured, name), getattr(measure(surface, of), name), rtol=1e-9, atol=1e-9
+            )
+    with pytest.raises(errors.DuplicateError) as raised:
+        unwrap(vertices, np.vstack([triangles, triangles[7, [1, 2, 0]]]), triangulate=triangulate)
+    assert raised.value.triangles[0] in (7, len(triangles))
+    with pytest.raises(errors.UVError):
+        unwrap(vertices, triangles, Settings(), uv[:-1], triangulate=triangulate)
