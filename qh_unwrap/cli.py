@@ -14,6 +14,7 @@ from pathlib import Path
 from . import __version__
 from .addon.options import MeshOptions
 from .core import Settings, UnwrapError
+from .core.stepping import finished
 
 _DESCRIPTION = "Unwrap meshes with little distortion and without flipped faces."
 _INPUT = (
@@ -97,7 +98,7 @@ def _run(args):
     files.prepare(objects, weld=args.weld, seams_from_islands=args.seams_from_islands)
     targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
     with files.quiet():
-        outcomes = _drain(unwrapping.unwrap_targets(targets, settings, options, bpy.context))
+        outcomes = finished(unwrapping.unwrap_targets(targets, settings, options, bpy.context))
     _print_table(outcomes, outcome.sentences(outcomes), outcome.change)
 
     done = [outcome for outcome in outcomes if not outcome.error]
@@ -157,14 +158,6 @@ def _chosen(objects, args):
     if unknown:
         raise _UsageError(f"there is no mesh object {', '.join(sorted(unknown))}: the file has {', '.join(present)}")
     return [obj for obj in objects if not args.object or obj.name in args.object]
-
-
-def _drain(steps):
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return stop.value
 
 
 def _print_table(outcomes, sentences, change):

@@ -11,6 +11,7 @@ import numpy as np
 from ..core import Settings, UnwrapError, distortion, unwrap_steps, unwrap_together
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import Island, attached, find_islands
+from ..core.stepping import mapped
 from ..core.validity import are_injective, as_stored, orientation
 from . import memory, mesh_arrays, packing, placing
 from .delaunay import triangulate
@@ -183,14 +184,10 @@ def _unwrap_together(works):
     old = [None if work.old_uv is None or work.is_cut else work.old_uv for work in works]
     islands = [(work.vertices, work.triangles, uv) for work, uv in zip(works, old, strict=True)]
     steps = unwrap_together(islands, works[0].settings)
-    while True:
-        try:
-            yield _TOGETHER * next(steps) / len(works)
-        except StopIteration as stop:
-            results = stop.value
-            break
-        except MemoryError:  # there may be enough for one at a time
-            return
+    try:
+        results = yield from mapped(lambda done: _TOGETHER * done / len(works), steps)
+    except MemoryError:  # there may be enough for one at a time
+        return
     for work, result in zip(works, results, strict=True):
         if result is not None:
             _keep(work, result)
@@ -234,12 +231,7 @@ def _result(work, hanging):
             raise UVError("its UVs are cut where there is no seam: mark the cuts with UV > Seams from Islands")
         uv = None
     steps = unwrap_steps(work.vertices, work.triangles, settings, uv=uv, pinned=pinned, triangulate=triangulate)
-    while True:
-        try:
-            state = next(steps)
-        except StopIteration as stop:
-            return stop.value
-        yield state.iteration
+    return (yield from mapped(lambda state: state.iteration, steps))
 
 
 def _place(works, all_works, options, context):

@@ -15,6 +15,7 @@ from .initial import conformal, fit, initial_map, project
 from .quasi_harmonic import Held, State, check_settings, diameter, energy, iterate
 from .settings import Settings
 from .solver import Dirichlet
+from .stepping import finished, mapped
 from .surface import Surface, checked_arrays
 from .validity import enclosed_area, invalid, is_injective
 
@@ -84,12 +85,7 @@ def unwrap(vertices, triangles, settings=None, uv=None, pinned=None, triangulate
     Returns a `Result`: `.uv` (n, 2), within the unit square or, where `uv` holds anything, in its frame, and
     `.report`.  Raises a subclass of `UnwrapError`.
     """
-    steps = unwrap_steps(vertices, triangles, settings, uv, pinned, triangulate)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return stop.value
+    return finished(unwrap_steps(vertices, triangles, settings, uv, pinned, triangulate))
 
 
 def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, triangulate=None):
@@ -100,15 +96,12 @@ def unwrap_steps(vertices, triangles, settings=None, uv=None, pinned=None, trian
         return (yield from _steps(vertices, triangles, settings, uv, pinned, triangulate))
     mesh = locality.Sorted(vertices, triangles)
     steps = _steps(mesh.vertices, mesh.triangles, settings, mesh.sorted(uv), mesh.sorted(pinned), triangulate)
-    while True:
-        try:
-            state = next(steps)
-        except StopIteration as stop:
-            return mesh.restored_result(stop.value)
-        except SurfaceError as error:
-            error.triangles = mesh.own_triangles(np.asarray(error.triangles, dtype=int))
-            raise
-        yield replace(state, uv=mesh.restored(state.uv))
+    try:
+        result = yield from mapped(lambda state: replace(state, uv=mesh.restored(state.uv)), steps)
+    except SurfaceError as error:
+        error.triangles = mesh.own_triangles(np.asarray(error.triangles, dtype=int))
+        raise
+    return mesh.restored_result(result)
 
 
 def _steps(vertices, triangles, settings, uv, pinned, triangulate):
@@ -131,17 +124,14 @@ def _steps(vertices, triangles, settings, uv, pinned, triangulate):
     else:
         domain, start, warnings = _held(surface, settings, given, pinned)
 
-    improving = _improved(surface, domain, settings, start, placed)
     changes = []
-    while True:
-        try:
-            state = next(improving)
-        except StopIteration as stop:
-            uv, converged = stop.value
-            break
+
+    def seen(state):
         if state.iteration:
             changes.append(state.change)
-        yield replace(state, uv=state.uv[:n] * mirror)
+        return replace(state, uv=state.uv[:n] * mirror)
+
+    uv, converged = yield from mapped(seen, _improved(surface, domain, settings, start, placed))
     chosen = placed(uv[:n])
 
     report = Report(

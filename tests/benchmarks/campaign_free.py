@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from qh_unwrap.core import Settings, Surface, unwrap, unwrap_together
+from qh_unwrap.core.stepping import finished
 from qh_unwrap.core.validity import is_injective
 
 from ..core.blender import triangulate
@@ -71,13 +72,7 @@ def unwrapped(patches, seed, largest=LARGEST):
 
 def together(cases):
     """The same patches once more, as far as they are small enough to be unwrapped together."""
-    steps = unwrap_together([(case.vertices, case.triangles, None) for case in cases])
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            results = stop.value
-            break
+    results = finished(unwrap_together([(case.vertices, case.triangles, None) for case in cases]))
     return [
         Case(case.kind, case.seed, case.vertices, case.triangles, result.uv, result.report.injective)
         for case, result in zip(cases, results, strict=True)

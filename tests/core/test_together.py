@@ -7,6 +7,7 @@ from qh_unwrap.core.descent import energies
 from qh_unwrap.core.distortion import measure, measure_pieces
 from qh_unwrap.core.initial import conformal, project
 from qh_unwrap.core.quasi_harmonic import energy
+from qh_unwrap.core.stepping import finished
 from qh_unwrap.core.validity import are_injective, is_injective
 
 from . import shapes
@@ -17,12 +18,7 @@ from .patches import Patches
 
 def together(islands, **settings):
     """The results of islands (vertices, triangles, uv)."""
-    steps = unwrap_together(islands, Settings(**settings))
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return stop.value
+    return finished(unwrap_together(islands, Settings(**settings)))
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from qh_unwrap.core import Settings, Surface, UnwrapError, distortion, errors, locality, unwrap, unwrap_steps
 from qh_unwrap.core.distortion import measure
 from qh_unwrap.core.initial import fit
+from qh_unwrap.core.stepping import finished, mapped
 from qh_unwrap.core.validity import is_injective
 
 from . import shapes
@@ -183,12 +184,7 @@ def test_steps_show_every_iteration_and_can_be_abandoned():
     steps.close()
     steps = unwrap_steps(vertices, triangles, Settings(boundary="CIRCLE", iterations=4, tolerance=0, refine=0))
     seen = []
-    while True:
-        try:
-            seen.append(next(steps))
-        except StopIteration as stop:
-            result = stop.value
-            break
+    result = finished(mapped(seen.append, steps))
     assert [state.iteration for state in seen] == [0, 1, 2, 3, 4]
     np.testing.assert_array_equal(seen[-1].uv, result.uv)
 
