@@ -13,6 +13,7 @@ from .solver import banded, nested_dissection
 
 # A triangle lower than this part of its longest edge has no area, for all that single precision can tell.
 _FLATTEST = 1e-6
+_KEYS = 2_000_000  # three numbers below it go into one of 64 bits
 # It is laid out with this part as its height: enough to stay valid in a map, too little to bend it.
 _THICKENED = 1e-2
 
@@ -84,9 +85,11 @@ class Surface:
                 f"{_count(repeated, 'face', 'faces')} with one vertex twice: dissolve degenerate faces",
                 np.flatnonzero(repeated),
             )
-        if len(np.unique(triangles)) < n:
+        if not np.bincount(triangles.ravel(), minlength=n).all():
             raise errors.LooseVertexError("some vertices belong to no face: delete the loose vertices")
         a, b, c = np.sort(triangles, axis=1).T
+        if n < _KEYS and np.diff(np.sort((a * n + b) * n + c)).all():
+            return
         order = np.lexsort((c, b, a))
         same = (np.diff(a[order]) == 0) & (np.diff(b[order]) == 0) & (np.diff(c[order]) == 0)
         if same.any():
@@ -117,10 +120,8 @@ class Surface:
     def _number_edges(self):
         """Make `edges` and `triangle_edges`; returns how many triangles each edge has."""
         n = len(self.vertices)
-        start, end = self.half_edges
-        key = np.minimum(start, end) * n + np.maximum(start, end)
-        unique, edge, count = np.unique(key, return_inverse=True, return_counts=True)
-        self.edges = np.column_stack([unique // n, unique % n])
+        unique, edge, count = np.unique(_edge_keys(self.triangles, n), return_inverse=True, return_counts=True)
+        self.edges = np.column_stack(np.divmod(unique, n))
         self.triangle_edges = edge.reshape(3, -1).T
         return count
 
@@ -168,8 +169,7 @@ class Surface:
     @property
     def half_edges(self):
         """Start and end vertices of the half-edges, (3 m,) each; number c * m + t runs from corner c of triangle t."""
-        corners = self.triangles.T
-        return corners.ravel(), np.roll(corners, -1, axis=0).ravel()
+        return _half_edges(self.triangles)
 
     @property
     def half_edge_edges(self):
@@ -239,7 +239,15 @@ class Surface:
         wider = copy.copy(self)
         wider.vertices = np.pad(self.vertices, ((0, len(uv) - len(self.vertices)), (0, 0)))
         wider.triangles = np.vstack([self.triangles, triangles])
-        wider._number_edges()
+        rim = self.half_edge_edges[self.on_boundary]
+        key = np.concatenate([self.edges[rim] @ [len(uv), 1], _edge_keys(triangles, len(uv))])
+        unique, edge = np.unique(key, return_inverse=True)
+        number = np.full(len(unique), -1)
+        number[edge[: len(rim)]] = rim
+        new = number < 0
+        number[new] = len(self.edges) + np.arange(new.sum())
+        wider.edges = np.vstack([self.edges, np.column_stack(np.divmod(unique[new], len(uv)))])
+        wider.triangle_edges = np.vstack([self.triangle_edges, number[edge[len(rim) :]].reshape(3, -1).T])
         some_shape = np.broadcast_to([[0.0, 0], [1, 0], [0, 1]], (len(triangles), 3, 2))
         wider.flat = np.concatenate([self.flat, some_shape])
         wider.hats = np.concatenate([self.hats, hat_gradients(some_shape)], axis=2)
@@ -280,6 +288,17 @@ def checked_arrays(vertices, triangles):
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise errors.IndexRangeError(f"a triangle refers to a vertex outside 0 to {len(vertices) - 1}")
     return vertices, triangles
+
+
+def _half_edges(triangles):
+    corners = triangles.T
+    return corners.ravel(), np.roll(corners, -1, axis=0).ravel()
+
+
+def _edge_keys(triangles, n):
+    """One number for the edge of every half-edge, (3 m,): the smaller vertex times n, and the larger."""
+    start, end = _half_edges(triangles)
+    return np.minimum(start, end) * n + np.maximum(start, end)
 
 
 def _numbered(starts, count):
