@@ -7,6 +7,8 @@ from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mck
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 _STEPS = 100
+_LARGE = 30_000  # unknowns, of which factorizing is so slow that an old factorization is tried first,
+_PATIENCE = 12  # for so many steps
 _LEAF = 8
 _FEW = 300  # vertices whose order hardly matters
 
@@ -31,6 +33,7 @@ class System:
         pattern = coo_array((np.arange(2 * len(edges) + n), where), shape=(n, n)).tocsc()
         self._order = order
         self._entry, self._indices, self._indptr = pattern.data, pattern.indices, pattern.indptr
+        self._mean = None
 
     def factor(self, forward, backward, diagonal):
         """A solver of right-hand sides (n, ...) for the matrix."""
@@ -49,17 +52,29 @@ class System:
         Conjugate gradients, with the mean of both coordinates' own matrices as preconditioner.
         """
         n = len(self._order)
-        own = (np.trace(entries, axis1=1, axis2=2) / 2 for entries in (forward, backward, diagonal))
-        factors = self._factors(*own)
         entries = np.concatenate([backward, forward, diagonal])[
             self._entry
         ]  # the pattern is by columns, blocks by rows
         matrix = bsr_array((entries, self._indices, self._indptr), shape=(2 * n, 2 * n))
-        mean = LinearOperator(matrix.shape, lambda rest: factors.solve(rest.reshape(-1, 2)).ravel())
-        solution, _ = cg(matrix, rhs[self._order].ravel(), rtol=residual, maxiter=_STEPS, M=mean)
+        rhs = rhs[self._order]
+        solution = np.zeros(2 * n)
+        tried, missed = self._mean is not None, True
+        if tried:  # that of an earlier matrix may still do
+            solution, missed = self._conjugate_gradients(matrix, rhs, residual, solution, _PATIENCE)
+        if missed:
+            self._mean = None  # before there is another: both would take twice the memory
+            own = (np.trace(entries, axis1=1, axis2=2) / 2 for entries in (forward, backward, diagonal))
+            self._mean = self._factors(*own)
+            solution, _ = self._conjugate_gradients(matrix, rhs, residual, solution, _STEPS)
+            if tried or n < _LARGE:
+                self._mean = None
         result = np.empty_like(rhs)
         result[self._order] = solution.reshape(-1, 2)
         return result
+
+    def _conjugate_gradients(self, matrix, rhs, residual, start, steps):
+        mean = LinearOperator(matrix.shape, lambda rest: self._mean.solve(rest.reshape(-1, 2)).ravel())
+        return cg(matrix, rhs.ravel(), start, rtol=residual, maxiter=steps, M=mean)
 
     def _factors(self, forward, backward, diagonal):
         n = len(self._order)

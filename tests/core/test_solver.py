@@ -4,7 +4,7 @@ from hypothesis import given
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from qh_unwrap.core import Surface
+from qh_unwrap.core import Surface, solver
 from qh_unwrap.core.solver import Dirichlet, System, nested_dissection
 from qh_unwrap.core.weights import cotangent, mean_value
 
@@ -58,6 +58,29 @@ def test_systems_of_blocks_are_solved_roughly():
         residual = np.einsum("iajb,jb->ia", matrix, solution) - rhs
         assert np.linalg.norm(residual) <= roughly * np.linalg.norm(rhs)
         assert (solution * rhs).sum() > 0
+
+
+def test_an_earlier_factorization_serves_or_is_replaced(monkeypatch):
+    monkeypatch.setattr(solver, "_LARGE", 0)
+    surface = Surface(*shapes.bump(2))
+    n = len(surface.vertices)
+    rng = np.random.default_rng(2)
+    system = System(surface.order, surface.edges)
+    made = []
+    factors = system._factors
+    monkeypatch.setattr(system, "_factors", lambda *entries: made.append(1) or factors(*entries))
+    i, j = surface.edges.T
+    rhs = rng.normal(size=(n, 2))
+    first, near, far = (10 ** (spread * rng.random(len(i))) for spread in (0, 0.01, 6))
+    for weight, count in ((first, 1), (near, 1), (far, 2), (far, 3), (far, 3)):
+        off = -weight[:, None, None] * np.eye(2)
+        diagonal = (1e-3 + np.bincount(i, weight, n) + np.bincount(j, weight, n))[:, None, None] * np.eye(2)
+        solution = system.solve_blocks(off, off, diagonal, rhs, 1e-6)
+        product = diagonal[:, 0, :1] * solution
+        np.subtract.at(product, i, weight[:, None] * solution[j])
+        np.subtract.at(product, j, weight[:, None] * solution[i])
+        assert np.linalg.norm(product - rhs) < 2e-6 * np.linalg.norm(rhs)
+        assert len(made) == count
 
 
 def test_the_order_is_a_permutation_with_less_fill_than_the_generic_one():
