@@ -3,10 +3,10 @@
 
 import numpy as np
 
+from ..core.validity import near_boxes
 from .placing import boxes
 
 _DEPTH = 1e-5  # of the size of the smaller triangle: what merely touches does not overlap
-_AT_ONCE = 1 << 20  # pairs of triangles looked at in one go
 
 
 def overlapping(islands):
@@ -39,21 +39,9 @@ def _meets(triangles, low, high):
 
 def _meeting(low, high):
     """Yield the pairs (k,), (k,) of boxes (n, 2) that overlap, some at a time; each pair comes once."""
-    order = np.argsort(low[:, 0], kind="stable")
-    low, high = low[order], high[order]
-    # Sorted by where they begin, those after a box meet it, along x, until one begins where it ends.
-    after = np.maximum(np.searchsorted(low[:, 0], high[:, 0]) - np.arange(len(low)) - 1, 0)
-    total = np.cumsum(after)
-    start = 0
-    while start < len(low):
-        stop = max(np.searchsorted(total, total[start] - after[start] + _AT_ONCE, side="right"), start + 1)
-        counts = after[start:stop]
-        one = np.repeat(np.arange(start, stop), counts)
-        other = one + 1 + np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts, counts)
-        meet = (low[one, 1] < high[other, 1]) & (low[other, 1] < high[one, 1])
-        if meet.any():
-            yield order[one[meet]], order[other[meet]]
-        start = stop
+    for one, other in near_boxes(low, high, np.zeros(len(low), int)):
+        meet = ((low[one] < high[other]) & (low[other] < high[one])).all(axis=1)
+        yield one[meet], other[meet]
 
 
 def _share_area(one, other):

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 
 from ..core import UnwrapError
+from ..core.pieces import joined, starts_of
 from . import placing
 
 _NAME = "QH Unwrap"
@@ -95,10 +96,9 @@ def _done(scene, meshes, options, nested, context):
 
 def _mesh(aspect, islands, made):
     """One mesh of all the islands' triangles, with an image of that aspect."""
-    first = np.cumsum([0] + [len(vertices) for vertices, _, _ in islands])
-    vertices = np.concatenate([vertices for vertices, _, _ in islands])
-    uv = np.concatenate([uv for _, _, uv in islands]) / (aspect, 1)
-    triangles = np.concatenate([triangles + start for (_, triangles, _), start in zip(islands, first, strict=False)])
+    vertices, triangles, uvs = zip(*islands, strict=True)
+    vertices, triangles, _, _ = joined(vertices, triangles)
+    uv = np.concatenate(uvs) / (aspect, 1)
     mesh = bpy.data.meshes.new(_NAME)
     made.append(mesh)
     mesh.vertices.add(len(vertices))
@@ -133,4 +133,4 @@ def _uvs(mesh, aspect, islands):
     mesh.uv_layers[0].uv.foreach_get("vector", corners)
     uv = np.empty((len(mesh.vertices), 2))
     uv[vertex] = corners.reshape(-1, 2) * (aspect, 1)
-    return np.split(uv, np.cumsum([len(vertices) for vertices, _, _ in islands])[:-1])
+    return np.split(uv, starts_of([vertices for vertices, _, _ in islands])[1:])

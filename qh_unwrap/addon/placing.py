@@ -4,6 +4,9 @@
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from ..core.pieces import numbers, starts_of
+from ..core.surface import signed_areas
+
 _STEEPEST_FLAT = 0.25  # an island that climbs less than this, by the way along it, has no upper end
 
 
@@ -14,7 +17,7 @@ def says_where(corners):
     """
     if not np.isfinite(corners).all():
         return False
-    area = np.abs(_signed_areas(corners)).sum()
+    area = np.abs(signed_areas(corners)).sum()
     return 1e-12 < area <= 1.01 * np.prod(np.ptp(corners.reshape(-1, 2), axis=0))
 
 
@@ -24,7 +27,7 @@ def in_place(uv, triangles, old):
     Keeps centre and area, and turns it as fits best in the sense of least squares.
     """
     new = uv[triangles]
-    area, old_area = (np.abs(_signed_areas(each)).sum() for each in (new, old))
+    area, old_area = (np.abs(signed_areas(each)).sum() for each in (new, old))
     centre, old_centre = _centre(new), _centre(old)
     z, w = ((each.reshape(-1, 2) - middle) @ (1, 1j) for each, middle in ((new, centre), (old, old_centre)))
     turn = np.vdot(z, w)
@@ -35,7 +38,7 @@ def in_place(uv, triangles, old):
 
 def is_mirrored(corners):
     """Whether most of these UVs, given as triangles (t, 3, 2), are."""
-    return _signed_areas(corners).sum() < 0
+    return signed_areas(corners).sum() < 0
 
 
 def upright(islands):
@@ -44,11 +47,11 @@ def upright(islands):
     Where one lies too flat for that, it is turned to its smallest box.
     """
     uvs, _, triangles, _ = zip(*islands, strict=True)
-    starts = _starts(triangles)
+    starts = starts_of(triangles)
     corners = np.concatenate([uv[its] for uv, _, its, _ in islands])
     heights = np.concatenate([(vertices @ up)[its] for _, vertices, its, up in islands])
-    piece = _numbers(starts, len(corners))
-    weight = np.abs(_signed_areas(corners))
+    piece = numbers(starts, len(corners))
+    weight = np.abs(signed_areas(corners))
     total = np.add.reduceat(weight, starts)
     centre = np.add.reduceat(weight[:, None] * corners.mean(axis=1), starts) / total[:, None]
     size = np.sqrt(areas([(vertices, its) for _, vertices, its, _ in islands]) / total)
@@ -102,39 +105,25 @@ def in_unit_square(uv):
     return (uv - low) * scale + (1 - size * scale) / 2
 
 
-def _signed_areas(corners):
-    a, b, c = corners.transpose(1, 0, 2)
-    (x1, y1), (x2, y2) = (b - a).T, (c - a).T
-    return (x1 * y2 - x2 * y1) / 2
-
-
 def areas(islands):
     """The areas in space, (k,), of islands given as (vertices, triangles)."""
     a, b, c = np.concatenate([vertices[triangles] for vertices, triangles in islands]).transpose(1, 0, 2)
-    starts = _starts([triangles for _, triangles in islands])
+    starts = starts_of([triangles for _, triangles in islands])
     return np.add.reduceat(np.linalg.norm(np.cross(b - a, c - a), axis=1), starts) / 2
 
 
 def uv_areas(islands):
     """The areas in the layout, (k,), of islands given as (uv, triangles)."""
     corners = np.concatenate([uv[triangles] for uv, triangles in islands])
-    return np.add.reduceat(np.abs(_signed_areas(corners)), _starts([triangles for _, triangles in islands]))
+    return np.add.reduceat(np.abs(signed_areas(corners)), starts_of([triangles for _, triangles in islands]))
 
 
 def boxes(uvs):
     """Lower left and upper right corners, (k, 2) each, of the islands' UVs."""
-    starts, uv = _starts(uvs), np.concatenate(uvs)
+    starts, uv = starts_of(uvs), np.concatenate(uvs)
     return np.minimum.reduceat(uv, starts), np.maximum.reduceat(uv, starts)
 
 
-def _starts(arrays):
-    return np.cumsum([0, *(len(each) for each in arrays[:-1])])
-
-
-def _numbers(starts, count):
-    return np.repeat(np.arange(len(starts)), np.diff(starts, append=count))
-
-
 def _centre(corners):
-    weight = np.abs(_signed_areas(corners))
+    weight = np.abs(signed_areas(corners))
     return weight @ corners.mean(axis=1) / weight.sum()

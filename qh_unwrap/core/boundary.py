@@ -102,7 +102,7 @@ def _chosen_corners(surface, aspect):
     """Four places in the outer loop that turn sharply and cut it into sides that suit the rectangle."""
     loop = surface.loops[0]
     at = _fractions(surface.vertices[loop])
-    turn = surface.boundary_angle_deficit
+    turn = np.pi - surface.angle_sums[loop]
     # What the outline turns within 1.5 % of its length on either side, the vertex itself counting double
     total = np.concatenate([[0.0], np.cumsum(np.tile(turn, 3))])
     around = np.concatenate([at - 1, at, at + 1])

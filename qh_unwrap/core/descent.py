@@ -9,7 +9,7 @@ it has before a step as its rest shape (Jiang, Schaefer, Panozzo 2017), so that 
 
 import numpy as np
 
-from .quasi_harmonic import exponents
+from .quasi_harmonic import density, exponents
 from .surface import hat_gradients
 from .tensor import area_scale, jacobian, jacobian_of
 
@@ -32,7 +32,7 @@ def descend(domain, balance, steps, uv):
     `uv` holds the vertices of `domain`, a `Held` or an `Exterior`, whose air is renewed as needed.  The last step of a
     piece is the one that no longer paid; the last of all ends it.  Maps with flips are left as they are.
     """
-    size = np.sqrt(area_scale(domain.surface, jacobian(domain.surface, uv)))[domain.surface.triangle_starts]
+    size = _size(domain.surface, uv)
     for _ in range(steps):
         uv = domain.renewed(uv)
         surface = domain.surface
@@ -65,9 +65,13 @@ def descend(domain, balance, steps, uv):
 
 def energies(surface, uv, balance):
     """The energy of every piece's map, at equal areas of surface and layout, (p,); infinite where one is flipped."""
-    size = np.sqrt(area_scale(surface, jacobian(surface, uv)))[surface.triangle_starts]
-    energy = _Energy(surface, uv, balance, size)
+    energy = _Energy(surface, uv, balance, _size(surface, uv))
     return energy.value(energy.jacobian(uv))
+
+
+def _size(surface, uv):
+    """The scale of every piece's map, (p,)."""
+    return np.sqrt(area_scale(surface, jacobian(surface, uv)))[surface.triangle_starts]
 
 
 class _Energy:
@@ -84,7 +88,7 @@ class _Energy:
         self._starts = surface.triangle_starts
         self.corners = surface.triangles[counts].T.copy()
         self.edges = surface.triangle_edges[counts].T.ravel()
-        self._powers = exponents(balance)
+        self._balance = balance
         air = surface.air[counts]
         self._hats = surface.hats[..., counts] / size[self.piece]
         self._hats[..., air] = hat_gradients(uv[self.corners.T[air]])
@@ -108,9 +112,8 @@ class _Energy:
         det = a * d - b * c
         flipped = ~(det > 0)
         det = np.where(flipped, 1.0, det)
-        p, r = self._powers
-        angle, area = (a * a + b * b + c * c + d * d) / (2 * det), (det + 1 / det) / 2
-        return np.add.reduceat(np.where(flipped, np.inf, self._weight * (angle**p * area**r)), self._starts)
+        value = self._weight * density(a * a + b * b + c * c + d * d, det, self._balance)
+        return np.add.reduceat(np.where(flipped, np.inf, value), self._starts)
 
     def longest_step(self, jacobian, change):
         """The smallest positive step of each piece at which a triangle collapses, (p,), or infinity."""
@@ -136,7 +139,7 @@ class _Energy:
         return gradient, blocks
 
     def _derivatives(self, jacobian, part):
-        p, r = self._powers
+        p, r = exponents(self._balance)
         (a, b), (c, d) = jacobian
         # Singular values in closed form, and the angles of the singular vectors
         turn, shear = np.arctan2(c - b, a + d), np.arctan2(c + b, a - d)
@@ -147,7 +150,7 @@ class _Energy:
         size, square = s1 * s1 + s2 * s2, det * det
         beta, gamma = (square - 1) / (square + 1), 4 * square / (square + 1) ** 2
 
-        density = self._weight[part] * (size / (2 * det)) ** p * ((det + 1 / det) / 2) ** r
+        value = self._weight[part] * density(size, det, self._balance)
         g1 = p * (2 * s1 / size - 1 / s1) + r * beta / s1  # logarithmic derivatives
         g2 = p * (2 * s2 / size - 1 / s2) + r * beta / s2
         f11 = g1 * g1 + p * (2 / size - 4 * (s1 / size) ** 2 + 1 / s1**2) + r * (gamma - beta) / s1**2
@@ -166,12 +169,12 @@ class _Energy:
         h1, h2 = _with_first(x * cos - y * sin), _with_first(x * sin + y * cos)
         k1, k2 = np.roll(h1, -1, axis=0), np.roll(h2, -1, axis=0)
         cos, sin = np.cos(left), np.sin(left)
-        along, across = density * g1 * h1, density * g2 * h2
+        along, across = value * g1 * h1, value * g2 * h2
         gradient = np.array([cos * along - sin * across, sin * along + cos * across])
 
         # The blocks in the frame of the left singular vectors; turned, only the second and third row change
-        long, short = density / 2 * h1 * k1, density / 2 * h2 * k2
-        one, other = density / 2 * h1 * k2, density / 2 * h2 * k1
+        long, short = value / 2 * h1 * k1, value / 2 * h2 * k2
+        one, other = value / 2 * h1 * k2, value / 2 * h2 * k1
         difference = (f11 - both) * long - (f22 - both) * short
         symmetric = (f12 + skew) * (one + other)
         cos, sin = np.cos(2 * left), np.sin(2 * left)
@@ -217,8 +220,7 @@ def _newton_direction(domain, energy, jacobian):
     m, d, s = (-np.bincount(one, part, n) - np.bincount(other, part, n) for part in (mean, difference, symmetric))
     diagonal = np.array([[m + d, s], [s, m - d]])[:, :, free]  # moving all vertices together changes nothing
     beside = np.array([[mean + difference, symmetric - anti], [symmetric + anti, mean - difference]])[:, :, inner]
-    forward, backward = beside.transpose(2, 0, 1), beside.transpose(2, 1, 0)
+    blocks = beside.transpose(2, 0, 1), diagonal.transpose(2, 0, 1)
     direction = np.zeros((n, 2))
-    blocks = forward, backward, diagonal.transpose(2, 0, 1)
     direction[free] = -dirichlet.system.solve_blocks(*blocks, gradient[free], _RESIDUAL)
     return gradient, direction

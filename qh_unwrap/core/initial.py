@@ -4,8 +4,8 @@
 import numpy as np
 
 from .errors import UVError
+from .pieces import starts_of
 from .solver import Dirichlet
-from .surface import corner_angles
 from .weights import cotangent, mean_value, uniform
 
 _WEIGHTS = {"UNIFORM": uniform, "HARMONIC": cotangent, "MEAN_VALUE": mean_value}
@@ -79,18 +79,17 @@ def conformal(surface):
     solid = surface.filled()
     outlines = surface.loops[: len(surface.vertex_starts)]
     loop = np.concatenate(outlines)
-    starts = np.cumsum([0, *(len(outline) for outline in outlines[:-1])])
+    starts = starts_of(outlines)
     n = len(solid.vertices)
     held = np.zeros(n, bool)
     held[loop] = True
     weights = cotangent(solid)
     solve = Dirichlet(solid.order, solid.edges, held, np.zeros((n, 2))).factor(weights)
-    angle_sum = np.bincount(solid.triangles.ravel(), corner_angles(solid.flat).ravel(), n)
-    u = solve(np.zeros((n, 1)), (angle_sum - 2 * np.pi)[:, None])[:, 0]
+    u = solve(np.zeros((n, 1)), (solid.angle_sums - 2 * np.pi)[:, None])[:, 0]
     i, j = solid.edges.T
     flux = np.bincount(i, weights[0] * (u[i] - u[j]), n) + np.bincount(j, weights[1] * (u[j] - u[i]), n)
 
-    direction = np.cumsum(np.pi - angle_sum[loop] + flux[loop])  # of the side that follows each vertex
+    direction = np.cumsum(np.pi - solid.angle_sums[loop] + flux[loop])  # of the side that follows each vertex
     along = np.column_stack([np.cos(direction), np.sin(direction)])
     following = np.concatenate([np.roll(outline, -1) for outline in outlines])
     length = np.linalg.norm(surface.vertices[following] - surface.vertices[loop], axis=1)

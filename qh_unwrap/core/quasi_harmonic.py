@@ -107,13 +107,17 @@ def exponents(balance):
     return float(np.clip(4 * balance, 0.05, 1)), min(1.0, 4 / 3 * (1 - balance)) ** 3
 
 
+def density(squares, det, balance):
+    """`a^p b^r` of triangles with the sum of squared stretches `squares` and the product `det`, (m,)."""
+    p, r = exponents(balance)
+    return (squares / (2 * det)) ** p * ((det + 1 / det) / 2) ** r
+
+
 def energy(surface, uv, balance):
     """The mean of `a^p b^r` over the surface, at equal areas of surface and layout."""
     G = jacobian(surface, uv)
     scale = area_scale(surface, G)
     (a, b), (c, d) = G
     det = np.maximum(np.abs(a * d - b * c) / scale, 1e-100)
-    angle, area = (a * a + b * b + c * c + d * d) / (2 * scale * det), (det + 1 / det) / 2
-    p, r = exponents(balance)
     share = np.where(surface.air | surface.degenerate, 0, surface.area)
-    return float(share @ (angle**p * area**r) / share.sum())
+    return float(share @ density((a * a + b * b + c * c + d * d) / scale, det, balance) / share.sum())

@@ -37,7 +37,7 @@ class System:
 
     def factor(self, forward, backward, diagonal):
         """A solver of right-hand sides (n, ...) for the matrix."""
-        factors = self._factors(forward, backward, diagonal)
+        factors = self._factors(np.concatenate([forward, backward, diagonal])[self._entry])
 
         def solve(rhs):
             result = np.empty_like(rhs)
@@ -46,15 +46,15 @@ class System:
 
         return solve
 
-    def solve_blocks(self, forward, backward, diagonal, rhs, residual):
+    def solve_blocks(self, beside, diagonal, rhs, residual):
         """Solve a symmetric positive definite system of blocks (2, 2) until a `residual` by that part of `rhs` (n, 2).
 
-        Conjugate gradients, with the mean of both coordinates' own matrices as preconditioner.
+        `beside` (k, 2, 2) are the blocks (i, j).  Conjugate gradients, with the mean of both coordinates' own matrices
+        as preconditioner.
         """
         n = len(self._order)
-        entries = np.concatenate([backward, forward, diagonal])[
-            self._entry
-        ]  # the pattern is by columns, blocks by rows
+        # The pattern is by columns and blocks are taken by rows: what stands at (i, j) is that of (j, i).
+        entries = np.concatenate([beside.swapaxes(1, 2), beside, diagonal])[self._entry]
         matrix = bsr_array((entries, self._indices, self._indptr), shape=(2 * n, 2 * n))
         rhs = rhs[self._order]
         solution = np.zeros(2 * n)
@@ -63,8 +63,7 @@ class System:
             solution, missed = self._conjugate_gradients(matrix, rhs, residual, solution, _PATIENCE)
         if missed:
             self._mean = None  # before there is another: both would take twice the memory
-            own = (np.trace(entries, axis1=1, axis2=2) / 2 for entries in (forward, backward, diagonal))
-            self._mean = self._factors(*own)
+            self._mean = self._factors(np.trace(entries, axis1=1, axis2=2) / 2)
             solution, _ = self._conjugate_gradients(matrix, rhs, residual, solution, _STEPS)
             if tried or n < _LARGE:
                 self._mean = None
@@ -76,9 +75,8 @@ class System:
         mean = LinearOperator(matrix.shape, lambda rest: self._mean.solve(rest.reshape(-1, 2)).ravel())
         return cg(matrix, rhs.ravel(), start, rtol=residual, maxiter=steps, M=mean)
 
-    def _factors(self, forward, backward, diagonal):
+    def _factors(self, entries):
         n = len(self._order)
-        entries = np.concatenate([forward, backward, diagonal])[self._entry]
         matrix = csc_array((entries, self._indices, self._indptr), shape=(n, n))
         # The order is ours, and the matrices are dominated by their diagonals: no column ordering, no pivoting.
         options = {"SymmetricMode": True}

@@ -9,13 +9,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from . import errors
+from .pieces import numbers
 from .solver import banded, nested_dissection
 
 # A triangle lower than this part of its longest edge has no area, for all that single precision can tell.
 _FLATTEST = 1e-6
-_KEYS = 2_000_000  # three numbers below it go into one of 64 bits
 # It is laid out with this part as its height: enough to stay valid in a map, too little to bend it.
 _THICKENED = 1e-2
+_KEYS = 2_000_000  # three numbers below it go into one of 64 bits
 
 
 class Surface:
@@ -48,8 +49,8 @@ class Surface:
         vertices, triangles = checked_arrays(vertices, triangles)
         self.triangles = triangles
         self.vertex_starts, self.triangle_starts = np.asarray(vertex_starts), np.asarray(triangle_starts)
-        self.vertex_piece = _numbered(self.vertex_starts, len(vertices))
-        self.piece = _numbered(self.triangle_starts, len(triangles))
+        self.vertex_piece = numbers(self.vertex_starts, len(vertices))
+        self.piece = numbers(self.triangle_starts, len(triangles))
         self._check_triangles(len(vertices))
         self._normalise(vertices)
         self._check_edges()
@@ -213,11 +214,9 @@ class Surface:
         return nested_dissection(self.vertices, self.edges)
 
     @cached_property
-    def boundary_angle_deficit(self):
-        """How far the outer boundary turns at each vertex of `loops[0]`: pi less the sum of its angles, in radians."""
-        angles = corner_angles(self.flat)
-        total = np.bincount(self.triangles.ravel(), weights=angles.ravel(), minlength=len(self.vertices))
-        return np.pi - total[self.loops[0]]
+    def angle_sums(self):
+        """The sum of the triangles' angles at every vertex, (n,), in radians."""
+        return np.bincount(self.triangles.ravel(), corner_angles(self.flat).ravel(), len(self.vertices))
 
     def filled(self, air=False):
         """The surface with every hole (all loops but the longest) closed by a fan; its first triangles are ours.
@@ -299,10 +298,6 @@ def _edge_keys(triangles, n):
     """One number for the edge of every half-edge, (3 m,): the smaller vertex times n, and the larger."""
     start, end = _half_edges(triangles)
     return np.minimum(start, end) * n + np.maximum(start, end)
-
-
-def _numbered(starts, count):
-    return np.repeat(np.arange(len(starts)), np.diff(starts, append=count))
 
 
 def _isometric_corners(corners):

@@ -12,6 +12,7 @@ from .descent import descend, energies
 from .distortion import measure_pieces
 from .errors import SurfaceError
 from .initial import conformal, project
+from .pieces import joined
 from .quasi_harmonic import Held
 from .settings import Settings
 from .solver import Dirichlet
@@ -52,7 +53,8 @@ def _unwrap(islands, settings):
     if not islands:
         return []
     try:
-        surface = _joined(islands)
+        vertices, triangles, _ = zip(*islands, strict=True)
+        surface = Surface(*joined(vertices, triangles))
     except SurfaceError:
         if len(islands) == 1:
             return [None]
@@ -84,13 +86,6 @@ def _unwrap(islands, settings):
 def _unwrap_some(islands, chosen, settings):
     results = iter(_unwrap([island for island, its in zip(islands, chosen, strict=True) if its], settings))
     return [next(results) if its else None for its in chosen]
-
-
-def _joined(islands):
-    vertices, triangles, _ = zip(*islands, strict=True)
-    starts = [np.cumsum([0, *(len(each) for each in arrays[:-1])]) for arrays in (vertices, triangles)]
-    moved = [its + start for its, start in zip(triangles, starts[0], strict=True)]
-    return Surface(np.concatenate(vertices), np.concatenate(moved), *starts)
 
 
 def _best_start(surface, balance):

@@ -119,7 +119,7 @@ def crossings(polygons, group, touching=False):
     group = np.repeat(group, np.diff(first, append=len(start)))
 
     found = np.zeros(group.max() + 1, int)
-    for one, other in _near_sides(np.minimum(start, end), np.maximum(start, end), group):
+    for one, other in near_boxes(np.minimum(start, end), np.maximum(start, end), group):
         a, b, c, d = start[one], end[one], start[other], end[other]
         across, back = turn(a, b, c) * turn(a, b, d), turn(c, d, a) * turn(c, d, b)
         if touching:
@@ -135,14 +135,14 @@ def crossings(polygons, group, touching=False):
     return found
 
 
-def _near_sides(low, high, group):
-    """The pairs of sides of one group with the boxes from `low` to `high` (n, 2) that meet, a portion at a time."""
+def near_boxes(low, high, group):
+    """The pairs (k,), (k,) of boxes `low` to `high` (n, 2), both of one group, that meet or touch; some at a time."""
     axis = int(np.argmax(np.ptp(low, axis=0)))
     # Laid end to end, the groups lie apart by more than rounding can close.
     apart = 2 * (np.ptp(np.vstack([low, high])[:, axis]) + 1e-30)
     begin, close = low[:, axis] + apart * group, high[:, axis] + apart * (group + 1e-9)
     order = np.argsort(begin, kind="stable")
-    # Sides sorted by where they begin: each is near its followers as long as those begin before it ends.
+    # Sorted by where they begin, each is near its followers as long as those begin before it ends.
     count = np.searchsorted(begin[order], close[order], side="right") - np.arange(len(order)) - 1
     for part in np.array_split(np.arange(len(order)), 1 + count.sum() // _PORTION):
         total = np.cumsum(count[part])

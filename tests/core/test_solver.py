@@ -53,8 +53,7 @@ def test_systems_of_blocks_are_solved_roughly():
     matrix[np.arange(n), :, np.arange(n)] = diagonal
     rhs = rng.normal(size=(n, 2))
     for roughly in (0.3, 1e-6):
-        blocks = off, off.swapaxes(1, 2), diagonal
-        solution = System(surface.order, surface.edges).solve_blocks(*blocks, rhs, roughly)
+        solution = System(surface.order, surface.edges).solve_blocks(off, diagonal, rhs, roughly)
         residual = np.einsum("iajb,jb->ia", matrix, solution) - rhs
         assert np.linalg.norm(residual) <= roughly * np.linalg.norm(rhs)
         assert (solution * rhs).sum() > 0
@@ -75,7 +74,7 @@ def test_an_earlier_factorization_serves_or_is_replaced(monkeypatch):
     for weight, count in ((first, 1), (near, 1), (far, 2), (far, 3), (far, 3)):
         off = -weight[:, None, None] * np.eye(2)
         diagonal = (1e-3 + np.bincount(i, weight, n) + np.bincount(j, weight, n))[:, None, None] * np.eye(2)
-        solution = system.solve_blocks(off, off, diagonal, rhs, 1e-6)
+        solution = system.solve_blocks(off, diagonal, rhs, 1e-6)
         product = diagonal[:, 0, :1] * solution
         np.subtract.at(product, i, weight[:, None] * solution[j])
         np.subtract.at(product, j, weight[:, None] * solution[i])

@@ -6,6 +6,7 @@ from qh_unwrap.core import Settings, Surface, distortion, unwrap, unwrap_togethe
 from qh_unwrap.core.descent import energies
 from qh_unwrap.core.distortion import measure, measure_pieces
 from qh_unwrap.core.initial import conformal, project
+from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.quasi_harmonic import energy
 from qh_unwrap.core.stepping import finished
 from qh_unwrap.core.validity import are_injective, is_injective
@@ -28,15 +29,9 @@ def small():
     return [(*patches(seed, largest=150)[1:], None) for seed in range(120)]
 
 
-def joined(islands):
-    vertices, triangles, _ = zip(*islands, strict=True)
-    starts = [np.cumsum([0, *(len(each) for each in arrays[:-1])]) for arrays in (vertices, triangles)]
-    moved = [its + start for its, start in zip(triangles, starts[0], strict=True)]
-    return Surface(np.concatenate(vertices), np.concatenate(moved), *starts)
-
-
 def test_pieces_of_a_surface_are_as_they_are_alone(small):
-    surface = joined(small)
+    vertices, triangles, _ = zip(*small, strict=True)
+    surface = Surface(*joined(vertices, triangles))
     uv = {make: make(surface) for make in (project, conformal)}
     pieces = {make: np.split(uv[make], surface.vertex_starts[1:]) for make in uv}
     measured = {make: measure_pieces(surface, uv[make]) for make in uv}

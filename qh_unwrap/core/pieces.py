@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays of several pieces laid end to end, and where each begins."""
+
+import numpy as np
+
+
+def starts_of(arrays):
+    """Where each of the arrays begins when they are joined, (p,)."""
+    return np.cumsum([0, *(len(each) for each in arrays[:-1])])
+
+
+def numbers(starts, count):
+    """The piece of each of `count` items, of which those of a piece begin at `starts` (p,)."""
+    return np.repeat(np.arange(len(starts)), np.diff(starts, append=count))
+
+
+def joined(points, triangles):
+    """Points (n, d) and triangles (m, 3) of several meshes, two lists, as one mesh, and where each begins in both."""
+    point_starts, triangle_starts = starts_of(points), starts_of(triangles)
+    moved = [its + start for its, start in zip(triangles, point_starts, strict=True)]
+    return np.concatenate(points), np.concatenate(moved), point_starts, triangle_starts
