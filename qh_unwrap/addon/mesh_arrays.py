@@ -58,7 +58,6 @@ def is_as_read(obj, arrays):
 
 
 def _read(obj, mesh, uv_name, options):
-    mesh.calc_loop_triangles()
     vertices = _get(mesh.vertices, "co", np.float32, 3)
     if options.use_subsurf_data:
         vertices = _smoothed(obj, mesh, vertices)
@@ -72,11 +71,11 @@ def _read(obj, mesh, uv_name, options):
     return MeshArrays(
         vertices=vertices.astype(np.float64) @ shown.T,
         up=shown[:, 2] / (np.linalg.norm(shown[:, 2]) or 1.0),
-        corner_vertex=_get(mesh.loops, "vertex_index", np.int32),
-        corner_edge=_get(mesh.loops, "edge_index", np.int32),
+        corner_vertex=_of_corners(mesh, ".corner_vert", "vertex_index"),
+        corner_edge=_of_corners(mesh, ".corner_edge", "edge_index"),
         face_start=_get(mesh.polygons, "loop_start", np.int32),
         seam=_get(mesh.edges, "use_seam", bool),
-        corner_triangles=_get(mesh.loop_triangles, "loops", np.int32, 3),
+        corner_triangles=_corner_triangles(mesh),
         uv=uv,
         pinned=pinned,
         aspect=_aspects(obj, mesh) if options.correct_aspect else np.ones(len(mesh.polygons)),
@@ -87,6 +86,19 @@ def _get(collection, name, dtype, width=1):
     values = np.empty(len(collection) * width, dtype=dtype)
     collection.foreach_get(name, values)
     return values.reshape(-1, width) if width > 1 else values
+
+
+def _of_corners(mesh, attribute, name):
+    """The corners' vertices or edges: read as an attribute they are copied in one go, by their name one by one."""
+    values = mesh.attributes.get(attribute)
+    return _get(mesh.loops, name, np.int32) if values is None else _get(values.data, "value", np.int32)
+
+
+def _corner_triangles(mesh):
+    if len(mesh.loops) == 3 * len(mesh.polygons):
+        return np.arange(len(mesh.loops), dtype=np.int32).reshape(-1, 3)
+    mesh.calc_loop_triangles()
+    return _get(mesh.loop_triangles, "loops", np.int32, 3)
 
 
 def _smoothed(obj, mesh, vertices):
@@ -115,6 +127,8 @@ def _smoothed(obj, mesh, vertices):
 
 def _aspects(obj, mesh):
     slots = np.array([_aspect(slot.material) for slot in obj.material_slots] or [1.0])
+    if (slots == slots[0]).all():
+        return np.full(len(mesh.polygons), slots[0])
     return slots[np.minimum(_get(mesh.polygons, "material_index", np.int32), len(slots) - 1)]
 
 

@@ -57,33 +57,24 @@ def _selected(obj, context):
     if obj.mode != 'EDIT':
         return visible_faces(obj.data)
     bm = bmesh.from_edit_mesh(obj.data)
-    rule = _rule(bm, context)
-    return np.fromiter((rule(face) and not face.hide for face in bm.faces), dtype=bool, count=len(bm.faces))
+    rule = _uv_rule(bm, context)
+    if rule is None:
+        return np.array([face.select and not face.hide for face in bm.faces], dtype=bool)
+    return np.array([rule(face) and not face.hide for face in bm.faces], dtype=bool)
 
 
 def _in_uv_editor(context):
     return isinstance(context.space_data, bpy.types.SpaceImageEditor)
 
 
-def _rule(bm, context):
+def _uv_rule(bm, context):
+    """Whether a face counts as selected, by its UVs; None where it is the mesh's own selection that counts."""
     uv_layer = bm.loops.layers.uv.active
     if uv_layer is None or not _in_uv_editor(context):
-        return _in_mesh
+        return None
     sync = context.scene.tool_settings.use_uv_select_sync
     if bpy.app.version < (5, 0, 0):
-        return _in_mesh if sync else lambda face: face.select and all(loop[uv_layer].select for loop in face.loops)
+        return None if sync else lambda face: face.select and all(loop[uv_layer].select for loop in face.loops)
     if not sync:
-        return _in_mesh_and_uvs
-    return _in_uvs if bm.uv_select_sync_valid else _in_mesh
-
-
-def _in_mesh(face):
-    return face.select
-
-
-def _in_uvs(face):
-    return face.uv_select
-
-
-def _in_mesh_and_uvs(face):
-    return face.select and face.uv_select
+        return lambda face: face.select and face.uv_select
+    return (lambda face: face.uv_select) if bm.uv_select_sync_valid else None
