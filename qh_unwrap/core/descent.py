@@ -207,7 +207,7 @@ def _positive(a, b, c):
 def _newton_direction(domain, energy, jacobian):
     """The gradient and the direction of descent, (n, 2) each, zero where held."""
     surface, dirichlet = domain.surface, domain.dirichlet
-    n, k, free, inner = len(surface.vertices), len(surface.edges), dirichlet.free, dirichlet.inner
+    n, k, free = len(surface.vertices), len(surface.edges), dirichlet.free
     by_corner, blocks = energy.derivatives(jacobian)
     gradient = np.zeros((n, 2))
     for i in range(2):
@@ -218,9 +218,8 @@ def _newton_direction(domain, energy, jacobian):
     mean, difference, symmetric, anti = (np.bincount(energy.edges, block.ravel(), k) for block in blocks)
     one, other = surface.edges.T
     m, d, s = (-np.bincount(one, part, n) - np.bincount(other, part, n) for part in (mean, difference, symmetric))
-    diagonal = np.array([[m + d, s], [s, m - d]])[:, :, free]  # moving all vertices together changes nothing
-    beside = np.array([[mean + difference, symmetric - anti], [symmetric + anti, mean - difference]])[:, :, inner]
-    blocks = beside.transpose(2, 0, 1), diagonal.transpose(2, 0, 1)
+    diagonal = (m + d, s), (s, m - d)  # moving all vertices together changes nothing
+    beside = (mean + difference, symmetric - anti), (symmetric + anti, mean - difference)
     direction = np.zeros((n, 2))
-    direction[free] = -dirichlet.system.solve_blocks(*blocks, gradient[free], _RESIDUAL)
+    direction[free] = -dirichlet.system.solve_blocks(beside, diagonal, gradient[free], _RESIDUAL)
     return gradient, direction

@@ -7,9 +7,12 @@ from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mck
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 _STEPS = 100
-_LARGE = 30_000  # unknowns, of which factorizing is so slow that an old factorization is tried first,
-_PATIENCE = 12  # for so many steps
-_LEAF = 8
+_LARGE = 1000  # unknowns, of which factorizing takes so long that single precision or an old matrix is tried first,
+_PATIENCE = 12  # the latter for so many steps
+_HUGE = 200_000  # unknowns, of which it pays to correct solutions in single precision
+_EXACT = 1e-9  # a correction of a solution by this part of it is not needed
+_CORRECTIONS = 6
+_LEAF = 32
 _FEW = 300  # vertices whose order hardly matters
 
 
@@ -20,41 +23,46 @@ class System:
     ----------
     order : (n,), in which the vertices are eliminated
     edges : (k, 2)
+    chosen : (2 k + n,), which of the entries that will be given belong to the matrix: by default, all
 
-    A matrix is given by its entries (i, j), (j, i) and (i, i): arrays (k, ...), (k, ...) and (n, ...).
+    A matrix is given by its entries (i, j), (j, i) and (i, i): arrays (k,), (k,) and (n,).
     """
 
-    def __init__(self, order, edges):
+    def __init__(self, order, edges, chosen=None):
         n = len(order)
-        place = np.empty(n, dtype=np.int64)
-        place[order] = np.arange(n)
-        i, j = place[edges].T
+        place = np.empty(n, dtype=np.int32)
+        place[order] = np.arange(n, dtype=np.int32)
+        i, j = place[edges.T]
         where = np.concatenate([i, j, place]), np.concatenate([j, i, place])
-        pattern = coo_array((np.arange(2 * len(edges) + n), where), shape=(n, n)).tocsc()
+        chosen = np.arange(2 * len(edges) + n) if chosen is None else chosen
+        pattern = coo_array((chosen, where), shape=(n, n)).tocsc()
         self._order = order
         self._entry, self._indices, self._indptr = pattern.data, pattern.indices, pattern.indptr
         self._mean = None
 
     def factor(self, forward, backward, diagonal):
         """A solver of right-hand sides (n, ...) for the matrix."""
-        factors = self._factors(np.concatenate([forward, backward, diagonal])[self._entry])
+        entries = np.concatenate([forward, backward, diagonal])[self._entry]
+        factors = self._factors(entries, single=len(self._order) >= _HUGE)
 
         def solve(rhs):
             result = np.empty_like(rhs)
-            result[self._order] = factors.solve(rhs[self._order])
+            result[self._order] = factors.solve_exactly(rhs[self._order])
             return result
 
         return solve
 
     def solve_blocks(self, beside, diagonal, rhs, residual):
-        """Solve a symmetric positive definite system of blocks (2, 2) until a `residual` by that part of `rhs` (n, 2).
+        """Solve a symmetric positive definite system of blocks until a `residual` by that part of `rhs` (n, 2).
 
-        `beside` (k, 2, 2) are the blocks (i, j).  Conjugate gradients, with the mean of both coordinates' own matrices
-        as preconditioner.
+        The blocks (i, j) are given as `beside`, 2 by 2 arrays (k,), and the blocks (i, i) likewise.  Conjugate
+        gradients, with the mean of both coordinates' own matrices as preconditioner.
         """
         n = len(self._order)
-        # The pattern is by columns and blocks are taken by rows: what stands at (i, j) is that of (j, i).
-        entries = np.concatenate([beside.swapaxes(1, 2), beside, diagonal])[self._entry]
+        entries = np.empty((len(self._entry), 2, 2))
+        for r, c in np.ndindex(2, 2):
+            # The pattern is by columns and blocks are taken by rows: what stands at (i, j) is that of (j, i).
+            entries[:, r, c] = np.concatenate([beside[c][r], beside[r][c], diagonal[r][c]])[self._entry]
         matrix = bsr_array((entries, self._indices, self._indptr), shape=(2 * n, 2 * n))
         rhs = rhs[self._order]
         solution = np.zeros(2 * n)
@@ -63,8 +71,10 @@ class System:
             solution, missed = self._conjugate_gradients(matrix, rhs, residual, solution, _PATIENCE)
         if missed:
             self._mean = None  # before there is another: both would take twice the memory
-            self._mean = self._factors(np.trace(entries, axis1=1, axis2=2) / 2)
-            solution, _ = self._conjugate_gradients(matrix, rhs, residual, solution, _STEPS)
+            self._mean = self._factors((entries[:, 0, 0] + entries[:, 1, 1]) / 2, single=n >= _LARGE)
+            solution, missed = self._conjugate_gradients(matrix, rhs, residual, solution, _STEPS)
+            if missed and self._mean.sharpened():
+                solution, _ = self._conjugate_gradients(matrix, rhs, residual, np.zeros(2 * n), _STEPS)
             if tried or n < _LARGE:
                 self._mean = None
         result = np.empty_like(rhs)
@@ -72,15 +82,60 @@ class System:
         return result
 
     def _conjugate_gradients(self, matrix, rhs, residual, start, steps):
-        mean = LinearOperator(matrix.shape, lambda rest: self._mean.solve(rest.reshape(-1, 2)).ravel())
+        mean = LinearOperator(matrix.shape, lambda rest: self._mean.solve(rest.reshape(-1, 2)).ravel(), dtype=float)
         return cg(matrix, rhs.ravel(), start, rtol=residual, maxiter=steps, M=mean)
 
-    def _factors(self, entries):
+    def _factors(self, entries, single):
         n = len(self._order)
-        matrix = csc_array((entries, self._indices, self._indptr), shape=(n, n))
+        return _Factors(csc_array((entries, self._indices, self._indptr), shape=(n, n)), single)
+
+
+class _Factors:
+    """L and U of a matrix in its own order, if wanted in single precision, which takes less time and memory."""
+
+    def __init__(self, matrix, single):
+        self._matrix = matrix
+        self._kind = np.float32 if single else np.float64
+        self._factorize()
+
+    def _factorize(self):
         # The order is ours, and the matrices are dominated by their diagonals: no column ordering, no pivoting.
         options = {"SymmetricMode": True}
-        return splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+        try:
+            with np.errstate(over="ignore"):
+                matrix = self._matrix.astype(self._kind, copy=False)
+            self._factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+        except RuntimeError:  # singular
+            if not self.sharpened():
+                raise
+
+    def sharpened(self):
+        """Factorize in double precision, unless that is done: then it returns False."""
+        if self._kind == np.float64:
+            return False
+        self._kind, self._factors = np.float64, None
+        self._factorize()
+        return True
+
+    def solve(self, rhs):
+        """To the factors' precision."""
+        with np.errstate(over="ignore"):
+            return self._factors.solve(rhs.astype(self._kind, copy=False)).astype(np.float64, copy=False)
+
+    def solve_exactly(self, rhs):
+        """To double precision, by corrections (Wilkinson's iterative refinement)."""
+        solution = self.solve(rhs)
+        if self._kind == np.float64:
+            return solution
+        size = np.linalg.norm(solution)
+        for _ in range(_CORRECTIONS):
+            correction = self.solve(rhs - self._matrix @ solution)
+            solution += correction
+            before, size = size, np.linalg.norm(correction)
+            if size == 0 or size * (size / before) <= _EXACT * np.linalg.norm(solution):  # as the next one will be
+                return solution
+        self.sharpened()
+        return self.solve(rhs)
 
 
 class Dirichlet:
@@ -92,16 +147,20 @@ class Dirichlet:
     edges : (k, 2)
     held : (n,) bool
     values : (n, 2), used where `held`
+
+    Its `system` is that of the `free` vertices, and chooses their entries from those of all.
     """
 
     def __init__(self, order, edges, held, values):
         self.held = held
         self.values = np.where(held[:, None], values, 0.0)
         self.free = np.flatnonzero(~held)
-        self.inner = np.flatnonzero(~held[edges].any(axis=1))
         self._edges = edges
+        k = len(edges)
+        inner = np.flatnonzero(~held[edges.T].any(axis=0))
         local = np.cumsum(~held) - 1
-        self.system = System(local[order[~held[order]]], local[edges[self.inner]])  # of the free vertices
+        order, edges = local[order[~held[order]]], local[edges[inner]]
+        self.system = System(order, edges, np.concatenate([inner, k + inner, 2 * k + self.free]))
 
     def diagonal(self, weights):
         """The sum of the weights around every vertex, (n,)."""
@@ -118,8 +177,7 @@ class Dirichlet:
         i, j = self._edges.T
         n = len(self.held)
         if len(self.free):
-            forward, backward = -weights[:, self.inner]
-            solve = self.system.factor(forward, backward, self.diagonal(weights)[self.free])
+            solve = self.system.factor(-weights[0], -weights[1], self.diagonal(weights))
 
         def result(values, sources=0.0):
             values = np.where(self.held[:, None], values, 0.0)
@@ -128,7 +186,7 @@ class Dirichlet:
                     np.bincount(i, weights[0] * known[j], n) + np.bincount(j, weights[1] * known[i], n)
                     for known in values.T
                 ]
-                values[self.free] = solve((np.column_stack(flux) + sources)[self.free])
+                values[self.free] = solve((np.array(flux).T + sources)[self.free])
             return values
 
         return result
@@ -149,11 +207,13 @@ def nested_dissection(points, edges):
     n, axes = points.shape
     if len(edges) and n <= _FEW:
         return banded(n, edges)
-    piece = np.zeros(n, dtype=np.int32)  # -1 once in a separator
+    levels = max(0, int(np.ceil(np.log2(max(n, 1) / _LEAF))))
+    kind = np.int16 if levels < 15 else np.int32  # the shorter ones are sorted faster
+    piece = np.zeros(n, kind)  # -1 once in a separator
     key = np.zeros(n, dtype=np.int64)  # one base-3 digit a level: first half 0, second half 1, separator 2
     orders = [np.argsort(points[:, axis], kind="stable") for axis in range(axes)]
-    i, j = edges.T.astype(np.int32)
-    for _ in range(max(0, int(np.ceil(np.log2(max(n, 1) / _LEAF))))):
+    i, j = edges.T.astype(np.intp, order="C")
+    for _ in range(levels):
         half, orders = _halves(piece, orders, i, j)
         cut = half[i] != half[j]
         crossing = np.flatnonzero(cut)
@@ -162,9 +222,10 @@ def nested_dissection(points, edges):
         key *= 3
         key += np.where(inside, half, 0)
         key[separator] += 2 - half[separator]
-        piece = np.where(inside, 2 * piece + half, -1).astype(np.int32)
+        piece = np.where(inside, 2 * piece + half, -1).astype(kind)
         piece[separator] = -1
-        kept = np.flatnonzero(~cut & (piece[i] >= 0) & (piece[j] >= 0))
+        inside = piece >= 0
+        kept = np.flatnonzero(~cut & inside[i] & inside[j])
         i, j = i[kept], j[kept]
     return np.argsort(key, kind="stable")
 
@@ -173,19 +234,17 @@ def _halves(piece, orders, i, j):
     """Which half (0 or 1) of its piece each vertex falls in; and `orders`, sorted by piece as well."""
     size = np.bincount(piece[piece >= 0], minlength=1)
     place = np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
-    second = 2 * place >= np.repeat(size, size)
-    edge_piece = piece[i]
+    second = (2 * place >= np.repeat(size, size)).astype(np.int8)
     candidates, cuts, grouped = [], [], []
     for order in orders:
-        own = piece[order]
-        inside = own >= 0
-        order = order[inside]
-        order = order[np.argsort(own[inside], kind="stable")]
+        order = order[np.argsort(piece[order], kind="stable")]
+        order = order[len(order) - len(second) :]  # those in separators come first
         grouped.append(order)
         half = np.zeros(len(piece), dtype=np.int8)
         half[order] = second
         candidates.append(half)
-        cuts.append(np.bincount(edge_piece[half[i] != half[j]], minlength=len(size)))
+        crossing = np.flatnonzero(half[i] != half[j])
+        cuts.append(np.bincount(piece[i[crossing]], minlength=len(size)))
     best = np.argmin(cuts, axis=0)
     return np.choose(best[np.maximum(piece, 0)], candidates), grouped
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import numpy as np
+import pytest
 from hypothesis import given
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
@@ -53,7 +54,7 @@ def test_systems_of_blocks_are_solved_roughly():
     matrix[np.arange(n), :, np.arange(n)] = diagonal
     rhs = rng.normal(size=(n, 2))
     for roughly in (0.3, 1e-6):
-        solution = System(surface.order, surface.edges).solve_blocks(off, diagonal, rhs, roughly)
+        solution = System(surface.order, surface.edges).solve_blocks(off.transpose(1, 2, 0), diagonal.T, rhs, roughly)
         residual = np.einsum("iajb,jb->ia", matrix, solution) - rhs
         assert np.linalg.norm(residual) <= roughly * np.linalg.norm(rhs)
         assert (solution * rhs).sum() > 0
@@ -67,19 +68,59 @@ def test_an_earlier_factorization_serves_or_is_replaced(monkeypatch):
     system = System(surface.order, surface.edges)
     made = []
     factors = system._factors
-    monkeypatch.setattr(system, "_factors", lambda *entries: made.append(1) or factors(*entries))
+    monkeypatch.setattr(system, "_factors", lambda *entries, **how: made.append(1) or factors(*entries, **how))
     i, j = surface.edges.T
     rhs = rng.normal(size=(n, 2))
     first, near, far = (10 ** (spread * rng.random(len(i))) for spread in (0, 0.01, 6))
     for weight, count in ((first, 1), (near, 1), (far, 2), (far, 3), (far, 3)):
-        off = -weight[:, None, None] * np.eye(2)
-        diagonal = (1e-3 + np.bincount(i, weight, n) + np.bincount(j, weight, n))[:, None, None] * np.eye(2)
+        off = -weight * np.eye(2)[:, :, None]
+        diagonal = (1e-3 + np.bincount(i, weight, n) + np.bincount(j, weight, n)) * np.eye(2)[:, :, None]
         solution = system.solve_blocks(off, diagonal, rhs, 1e-6)
-        product = diagonal[:, 0, :1] * solution
+        product = diagonal[0, 0, :, None] * solution
         np.subtract.at(product, i, weight[:, None] * solution[j])
         np.subtract.at(product, j, weight[:, None] * solution[i])
         assert np.linalg.norm(product - rhs) < 2e-6 * np.linalg.norm(rhs)
         assert len(made) == count
+
+
+def laplacian(surface, held, hanging=1.0):
+    """A matrix that has the vertex `held` at zero, and hangs the others on it by weights of this size."""
+    n = len(surface.vertices)
+    weight = np.full(len(surface.edges), 1.0)
+    weight[(surface.edges == held).any(axis=1)] = hanging
+    i, j = surface.edges.T
+    diagonal = np.bincount(i, weight, n) + np.bincount(j, weight, n)
+    diagonal[held] += hanging
+    matrix = coo_array((np.r_[-weight, -weight], (np.r_[i, j], np.r_[j, i])), shape=(n, n)).toarray()
+    return weight, diagonal, matrix + np.diag(diagonal)
+
+
+@pytest.mark.parametrize("hanging", [1.0, 1e-6])
+def test_single_precision_gives_the_same_solutions_as_double(monkeypatch, hanging):
+    monkeypatch.setattr(solver, "_HUGE", 0)
+    surface = Surface(*shapes.bump(4))
+    weight, diagonal, matrix = laplacian(surface, 7, hanging)
+    made = []
+    monkeypatch.setattr(solver, "splu", lambda matrix, **how: made.append(matrix.dtype) or splu(matrix, **how))
+    solve = System(surface.order, surface.edges).factor(-weight, -weight, diagonal)
+    rhs = matrix @ np.random.default_rng(4).normal(size=(len(matrix), 2))
+    residual = matrix @ solve(rhs) - rhs
+    assert np.linalg.norm(residual) <= 1e-9 * np.linalg.norm(rhs)
+    assert made[0] == np.float32
+    assert (made[-1] == np.float64) == (hanging < 1), "where single precision does not suffice"
+    assert not solve(np.zeros((len(matrix), 2))).any()
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-60, 1e60])
+def test_blocks_are_solved_whatever_their_size_in_single_precision(monkeypatch, size):
+    monkeypatch.setattr(solver, "_LARGE", 0)
+    surface = Surface(*shapes.bump(5))
+    weight, diagonal, matrix = laplacian(surface, 3)
+    rhs = np.random.default_rng(5).normal(size=(len(matrix), 2))
+    beside = -size * weight * np.eye(2)[:, :, None]
+    blocks = size * diagonal * np.eye(2)[:, :, None]
+    solution = System(surface.order, surface.edges).solve_blocks(beside, blocks, rhs, 1e-6)
+    assert np.linalg.norm(size * matrix @ solution - rhs) <= 1e-6 * np.linalg.norm(rhs)
 
 
 def test_the_order_is_a_permutation_with_less_fill_than_the_generic_one():
