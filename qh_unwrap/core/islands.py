@@ -12,6 +12,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from .pieces import first_and_last
+
 
 @dataclass(frozen=True)
 class Island:
@@ -126,8 +128,8 @@ def _around_faces(face_start, corner_count):
 def _across_edges(corner_vertex, corner_edge, following, seam, corners):
     """Where an edge joins two faces: the corner of one that starts it, and the other's corners at its start and end."""
     uses = np.bincount(corner_edge[corners], minlength=len(seam))
-    inner = corners[((uses == 2) & ~seam)[corner_edge[corners]]]
-    one, other = inner[np.argsort(corner_edge[inner], kind="stable")].reshape(-1, 2).T
+    inner = (uses == 2) & ~seam
+    one, other = (each[inner] for each in first_and_last(corners, corner_edge[corners], len(seam)))
     alike = corner_vertex[one] == corner_vertex[other]  # both run the same way: one of the faces is inside out
     return one, np.where(alike, other, following[other]), np.where(alike, following[other], other)
 
@@ -143,6 +145,8 @@ def _without_doubled_diagonals(triangles, following, uv_vertex):
     Faces are triangulated one by one, so where two of them share several edges in a row, both may be cut along the
     same diagonal, and the triangles beside it would lie on top of each other.  Such diagonals are flipped.
     """
+    if (np.roll(triangles, -1, axis=1) == following[triangles]).all():
+        return triangles  # there are no diagonals
     for _ in range(8):
         halves = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
         low, high = np.sort(uv_vertex[halves], axis=1).T

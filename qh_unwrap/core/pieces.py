@@ -14,6 +14,13 @@ def numbers(starts, count):
     return np.repeat(np.arange(len(starts)), np.diff(starts, append=count))
 
 
+def first_and_last(items, place, count):
+    """The first and the last of the `items` (k,) at each of `count` places, (count,) each; anything where is none."""
+    first, last = np.empty((2, count), items.dtype)
+    first[place[::-1]], last[place] = items[::-1], items
+    return first, last
+
+
 def joined(points, triangles):
     """Points (n, d) and triangles (m, 3) of several meshes, two lists, as one mesh, and where each begins in both."""
     point_starts, triangle_starts = starts_of(points), starts_of(triangles)

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from . import errors
-from .pieces import numbers
+from .pieces import first_and_last, numbers
 from .solver import banded, nested_dissection
 
 # A triangle lower than this part of its longest edge has no area, for all that single precision can tell.
@@ -54,7 +54,6 @@ class Surface:
         self._check_triangles(len(vertices))
         self._normalise(vertices)
         self._check_edges()
-        self._check_vertices()
         self.loops = self._boundary_loops()
         self._check_topology()
         self.flat, self.degenerate = _isometric_corners(self.vertices[triangles])
@@ -133,8 +132,7 @@ class Surface:
         following = (corner + m) % (3 * m)
         first, second = self._twins
         link = np.concatenate([first, following[first]]), np.concatenate([following[second], second])
-        graph = coo_array((np.ones(len(link[0]), bool), link), shape=(3 * m, 3 * m))
-        fans, fan = connected_components(graph, directed=False)
+        fans, fan = _components(3 * m, *link)
         if fans > len(self.vertices):
             fans_at = np.bincount(self.triangles.T.ravel()[np.unique(fan, return_index=True)[1]])
             wrong = fans_at > 1
@@ -145,22 +143,27 @@ class Surface:
 
     def _check_topology(self):
         n, p = len(self.vertices), len(self.vertex_starts)
-        a, b = self.edges.T
-        graph = coo_array((np.ones(len(a), bool), (a, b)), shape=(n, n))
-        found, label = connected_components(graph, directed=False)
-        if found != p or len(np.unique(label * p + self.vertex_piece)) > p:
-            raise errors.DisconnectedError(f"it has {found} separate pieces: unwrap each on its own")
         loops, vertices, edges, triangles = (
             np.bincount(self.vertex_piece[of], minlength=p)
-            for of in ([loop[0] for loop in self.loops], slice(None), a, self.triangles[:, 0])
+            for of in ([loop[0] for loop in self.loops], slice(None), self.edges[:, 0], self.triangles[:, 0])
         )
+        # Euler's formula: twice the handles, and vertices at which the surface touches itself
+        excess = 2 - loops - (vertices - edges + triangles)
+        m = len(self.triangles)
+        first, second = self._twins
+        found, part = _components(m, first % m, second % m)
+        if found == p and len(np.unique(part * p + self.piece)) == p and loops.all() and not excess.any():
+            return
+        self._check_vertices()
+        found, part = _components(n, *self.edges.T)
+        if found != p or len(np.unique(part * p + self.vertex_piece)) > p:
+            raise errors.DisconnectedError(f"it has {found} separate pieces: unwrap each on its own")
         if not loops.all():
             raise errors.ClosedError("it is closed: mark a seam to cut it open")
-        handles = ((2 - loops - (vertices - edges + triangles)) // 2).max()
-        if handles:
-            raise errors.GenusError(
-                f"it has {handles} {'handle' if handles == 1 else 'handles'}, like a torus: mark seams to cut it open"
-            )
+        handles = (excess // 2).max()
+        raise errors.GenusError(
+            f"it has {handles} {'handle' if handles == 1 else 'handles'}, like a torus: mark seams to cut it open"
+        )
 
     @property
     def loop_piece(self):
@@ -180,12 +183,14 @@ class Surface:
     @property
     def _twins(self):
         # The two half-edges of every interior edge.
-        inner = np.flatnonzero(~self.on_boundary)
-        pairs = inner[np.argsort(self.half_edge_edges[inner], kind="stable")]
-        return pairs[0::2], pairs[1::2]
+        first, last = first_and_last(np.arange(self.triangles.size), self.half_edge_edges, len(self.edges))
+        inner = first != last
+        return first[inner], last[inner]
 
     def _boundary_loops(self):
         start, end = (ends[self.on_boundary] for ends in self.half_edges)
+        if len(np.unique(start)) < len(start):
+            self._check_vertices()
         following = dict(zip(start.tolist(), end.tolist(), strict=True))
         loops = []
         while following:
@@ -338,6 +343,12 @@ def corner_angles(corners):
     back = np.roll(corners, 1, axis=1) - corners
     cross = ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]
     return np.arctan2(np.abs(cross), (ahead * back).sum(axis=2))
+
+
+def _components(count, one, other):
+    """How many parts things fall into that are linked in pairs, and that of each, (count,)."""
+    links = coo_array((np.ones(len(one), bool), (one, other)), shape=(count, count))
+    return connected_components(links, directed=False)
 
 
 def edge_lengths(points):

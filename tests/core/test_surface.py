@@ -33,6 +33,10 @@ def broken(name):
         index = np.r_[len(vertices) - 1, len(vertices) + np.arange(len(other))]
         triangles = np.vstack([triangles, index[triangles]])
         vertices = np.vstack([vertices, other])
+    elif name == "bubble":  # as many vertices shared as Euler's formula counts for the second piece
+        other, faces = shapes.tetrahedron()
+        index = np.r_[5, 3, len(vertices) + np.arange(len(other) - 2)]
+        triangles, vertices = np.vstack([triangles, index[faces]]), np.vstack([vertices, other[2:] + [0, 0, 1]])
     elif name == "pieces":
         triangles = np.vstack([triangles, triangles + len(vertices)])
         vertices = np.vstack([vertices, vertices + np.array([9, 0, 0])])
@@ -61,6 +65,7 @@ def broken(name):
         ("edge", errors.NonManifoldEdgeError),
         ("winding", errors.WindingError),
         ("vertex", errors.NonManifoldVertexError),
+        ("bubble", errors.NonManifoldVertexError),
         ("pieces", errors.DisconnectedError),
         ("closed", errors.ClosedError),
         ("handle", errors.GenusError),
