@@ -4,8 +4,8 @@
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from ..core.pieces import numbers, starts_of
-from ..core.surface import signed_areas
+from ..core.pieces import joined, numbers, starts_of
+from ..core.triangles import areas_in_space, box, corners_of, signed_areas
 
 _STEEPEST_FLAT = 0.25  # an island that climbs less than this, by the way along it, has no upper end
 
@@ -46,21 +46,22 @@ def upright(islands):
 
     Where one lies too flat for that, it is turned to its smallest box.
     """
-    uvs, _, triangles, _ = zip(*islands, strict=True)
-    starts = starts_of(triangles)
-    corners = np.concatenate([uv[its] for uv, _, its, _ in islands])
-    heights = np.concatenate([(vertices @ up)[its] for _, vertices, its, up in islands])
-    piece = numbers(starts, len(corners))
-    weight = np.abs(signed_areas(corners))
+    uvs = [uv for uv, _, _, _ in islands]
+    heights = [vertices @ up for _, vertices, _, up in islands]
+    points = [np.column_stack(each) for each in zip(uvs, heights, strict=True)]
+    points, triangles, _, starts = joined(points, [its for _, _, its, _ in islands])
+    x, y, height = corners_of(points, triangles).T
+    piece = numbers(starts, len(triangles))
+    weight = np.abs(signed_areas(corners_of(points[:, :2], triangles)))
+
+    def sums(values):
+        return np.add.reduceat(weight * values.sum(axis=0), starts)
+
     total = np.add.reduceat(weight, starts)
-    centre = np.add.reduceat(weight[:, None] * corners.mean(axis=1), starts) / total[:, None]
     size = np.sqrt(areas([(vertices, its) for _, vertices, its, _ in islands]) / total)
-    x, y = ((corners - centre[piece, None]) * size[piece, None, None]).transpose(2, 1, 0)
+    x, y = ((along - (sums(along) / (3 * total))[piece]) * size[piece] for along in (x, y))
     # The slope of the height over the layout, by least squares.
-    xx, xy, yy, xh, yh = (
-        np.add.reduceat(weight * (one * other).sum(axis=0), starts)
-        for one, other in ((x, x), (x, y), (y, y), (x, heights.T), (y, heights.T))
-    )
+    xx, xy, yy, xh, yh = (sums(one * other) for one, other in ((x, x), (x, y), (y, y), (x, height), (y, height)))
     spread = np.moveaxis(np.array([[xx, xy], [xy, yy]]), 2, 0)
     slope = (np.linalg.pinv(spread) @ np.column_stack([xh, yh])[:, :, None])[:, :, 0]
     steepness = np.linalg.norm(slope, axis=1)
@@ -78,7 +79,8 @@ def _on_smallest_box(uv):
         return uv
     side = (np.roll(outline, -1, axis=0) - outline) @ (1, 1j)
     turns = np.abs(side[side != 0]) / side[side != 0]
-    extents = np.array([np.ptp(_turned(outline, turn), axis=0) for turn in turns])
+    turned = (outline @ (1, 1j))[:, None] * turns
+    extents = np.column_stack([np.ptp(turned.real, axis=0), np.ptp(turned.imag, axis=0)])
     best = np.argmin(extents.prod(axis=1))
     width, height = extents[best]
     return _turned(uv, turns[best] * (1 if width >= height else -1j))
@@ -100,22 +102,21 @@ def free_tile(rest):
 
 def in_unit_square(uv):
     """Scale `uv` (n, 2) until its longer side is 1, in the middle of the 0 to 1 square."""
-    low, size = uv.min(axis=0), np.ptp(uv, axis=0)
+    low, size = box(uv)
     scale = 1 / size.max() if size.max() > 0 else 1.0
     return (uv - low) * scale + (1 - size * scale) / 2
 
 
 def areas(islands):
     """The areas in space, (k,), of islands given as (vertices, triangles)."""
-    a, b, c = np.concatenate([vertices[triangles] for vertices, triangles in islands]).transpose(1, 0, 2)
-    starts = starts_of([triangles for _, triangles in islands])
-    return np.add.reduceat(np.linalg.norm(np.cross(b - a, c - a), axis=1), starts) / 2
+    points, triangles, _, starts = joined(*zip(*islands, strict=True))
+    return np.add.reduceat(areas_in_space(points, triangles), starts)
 
 
 def uv_areas(islands):
     """The areas in the layout, (k,), of islands given as (uv, triangles)."""
-    corners = np.concatenate([uv[triangles] for uv, triangles in islands])
-    return np.add.reduceat(np.abs(signed_areas(corners)), starts_of([triangles for _, triangles in islands]))
+    uv, triangles, _, starts = joined(*zip(*islands, strict=True))
+    return np.add.reduceat(np.abs(signed_areas(corners_of(uv, triangles))), starts)
 
 
 def boxes(uvs):

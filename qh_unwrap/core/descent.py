@@ -10,8 +10,8 @@ it has before a step as its rest shape (Jiang, Schaefer, Panozzo 2017), so that 
 import numpy as np
 
 from .quasi_harmonic import density, exponents
-from .surface import hat_gradients
 from .tensor import area_scale, jacobian, jacobian_of
+from .triangles import by_parts, corners_of, hat_gradients
 
 _AIR = 0.1  # the air's part of the energy
 _FLAT = 1e-2  # of its made-up area counts a triangle that has none, so that it cannot flip either
@@ -19,7 +19,6 @@ _SMALLEST = 1e-9  # eigenvalue of the Hessian's triangles
 _LONGEST = 0.9  # of the step at which a triangle collapses
 _ARMIJO = 1e-4
 _HALVINGS = 20
-_AT_ONCE = 8192  # triangles
 _NEGLIGIBLE = 1e-3  # a decrease of the energy by this part of it is not worth a step,
 _LITTLE = 1e-2  # nor one by this part of what it lies above its least value, 1
 _INVISIBLE = 1e-6  # a decrease that nobody could see
@@ -91,7 +90,7 @@ class _Energy:
         self._balance = balance
         air = surface.air[counts]
         self._hats = surface.hats[..., counts] / size[self.piece]
-        self._hats[..., air] = hat_gradients(uv[self.corners.T[air]])
+        self._hats[..., air] = hat_gradients(corners_of(uv, self.corners[:, air].T))
         weight = np.where(air, 0, np.where(surface.degenerate[counts], _FLAT, 1) * surface.area[counts])
         self._weight = weight / np.add.reduceat(weight, self._starts)[self.piece]
         if air.any():  # there is one piece
@@ -131,14 +130,9 @@ class _Energy:
 
         The rows (mean, difference, symmetric, antisymmetric) make up the blocks [[m + d, s - a], [s + a, m - d]].
         """
-        m = jacobian.shape[2]
-        gradient, blocks = np.empty((2, 3, m)), np.empty((4, 3, m))
-        for start in range(0, m, _AT_ONCE):  # what is at work stays in the processor's cache
-            part = slice(start, start + _AT_ONCE)
-            gradient[..., part], blocks[..., part] = self._derivatives(jacobian[..., part], part)
-        return gradient, blocks
+        return by_parts(self._derivatives, jacobian, self._hats, self._weight)
 
-    def _derivatives(self, jacobian, part):
+    def _derivatives(self, jacobian, hats, weight):
         p, r = exponents(self._balance)
         (a, b), (c, d) = jacobian
         # Singular values in closed form, and the angles of the singular vectors
@@ -150,7 +144,7 @@ class _Energy:
         size, square = s1 * s1 + s2 * s2, det * det
         beta, gamma = (square - 1) / (square + 1), 4 * square / (square + 1) ** 2
 
-        value = self._weight[part] * density(size, det, self._balance)
+        value = weight * density(size, det, self._balance)
         g1 = p * (2 * s1 / size - 1 / s1) + r * beta / s1  # logarithmic derivatives
         g2 = p * (2 * s2 / size - 1 / s2) + r * beta / s2
         f11 = g1 * g1 + p * (2 / size - 4 * (s1 / size) ** 2 + 1 / s1**2) + r * (gamma - beta) / s1**2
@@ -165,7 +159,7 @@ class _Energy:
 
         # The hats' gradients along the right singular vectors: h of the corners, k of the next ones
         cos, sin = np.cos(right), np.sin(right)
-        x, y = self._hats[:, 0, part], self._hats[:, 1, part]
+        x, y = hats[:, 0], hats[:, 1]
         h1, h2 = _with_first(x * cos - y * sin), _with_first(x * sin + y * cos)
         k1, k2 = np.roll(h1, -1, axis=0), np.roll(h2, -1, axis=0)
         cos, sin = np.cos(left), np.sin(left)

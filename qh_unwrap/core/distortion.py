@@ -8,6 +8,7 @@ import numpy as np
 from .errors import UVError
 from .surface import Surface
 from .tensor import squared_stretches
+from .triangles import by_parts
 from .validity import orientation
 
 
@@ -48,21 +49,26 @@ def measure_pieces(surface, uv):
     larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
     share = np.where(surface.degenerate, 0, surface.area)
     share /= surface.sums(share)[surface.piece]
-    stretch = (1 / larger + 1 / smaller) / 2
-    angle = np.sqrt(larger / smaller)
-    log_area = (np.log(larger) + np.log(smaller)) / 2
+    squared, dirichlet, angle, log_area = by_parts(_measures, larger, smaller)
     sign = orientation(uv, surface.triangles)
     sign[(sign == 0) & surface.degenerate] = 1
     numbers = (
-        np.sqrt(surface.sums(share * stretch)).tolist(),
-        surface.sums(share * (larger + smaller + 1 / larger + 1 / smaller) / 4).tolist(),
+        np.sqrt(surface.sums(share * squared)).tolist(),
+        surface.sums(share * dirichlet).tolist(),
         surface.sums(share * angle).tolist(),
         np.sqrt(surface.sums(share * log_area**2)).tolist(),
         surface.sums((sign < 0).astype(int)).tolist(),
         surface.sums((sign == 0).astype(int)).tolist(),
     )
-    arrays = (np.split(each, surface.triangle_starts[1:]) for each in (np.sqrt(stretch), angle, log_area, sign))
+    arrays = (np.split(each, surface.triangle_starts[1:]) for each in (np.sqrt(squared), angle, log_area, sign))
     return [Distortion(*values) for values in zip(*numbers, *arrays, strict=True)]
+
+
+def _measures(larger, smaller):
+    """Squared L2 stretch, symmetric Dirichlet energy, angle and log-area distortion of each triangle."""
+    squared = (1 / larger + 1 / smaller) / 2
+    dirichlet = (larger + smaller) / 4 + squared / 2
+    return squared, dirichlet, np.sqrt(larger / smaller), (np.log(larger) + np.log(smaller)) / 2
 
 
 def distortion(vertices, triangles, uv):

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .solver import Dirichlet
-from .surface import signed_areas
+from .triangles import corners_of, signed_areas
 from .validity import orientation
 from .weights import cotangent
 
@@ -50,7 +50,7 @@ class Exterior:
         Returns None if there is no air yet and none can be made, since the outline crosses itself.
         """
         if self.dirichlet is not None:
-            now = _quality(uv[self.surface.triangles[self.surface.air]])
+            now = _quality(corners_of(uv, self.surface.triangles[self.surface.air]))
             if (now > _WORN * self._quality).all():
                 return uv
         n = len(self._island.vertices)
@@ -65,7 +65,7 @@ class Exterior:
         self.dirichlet = Dirichlet(
             self.surface.order, self.surface.edges, np.concatenate([self._pinned, on_circle]), uv
         )
-        self._quality = _quality(uv[triangles])
+        self._quality = _quality(corners_of(uv, triangles))
         return uv
 
     def recalled(self, uv, n):
@@ -81,8 +81,8 @@ class Exterior:
         island = self._island
         i, j = island.edges.T
         weights = cotangent(island, tensor[:, : len(island.triangles)])[0]
-        energy = weights @ ((uv[i] - uv[j]) ** 2).sum(axis=1)
-        area = signed_areas(uv[island.triangles]).sum()
+        energy = sum(weights @ (x[i] - x[j]) ** 2 for x in uv.T)
+        area = signed_areas(corners_of(uv, island.triangles)).sum()
         return tensor * np.where(self.surface.air, 1.0, 2 * area / energy) if area > 0 else tensor
 
 
@@ -111,7 +111,7 @@ def make_air(uv, loops, triangulate):
     triangles = triangulate(points, sides)
     if triangles is None:
         return None
-    if signed_areas(points[triangles]).sum() < 0:
+    if signed_areas(corners_of(points, triangles)).sum() < 0:
         triangles = triangles[:, ::-1]
     triangles = _outside(triangles, sides, len(points))
     if triangles is None or len(np.unique(triangles)) < len(points):

@@ -6,6 +6,7 @@ import numpy as np
 from .errors import UVError
 from .pieces import starts_of
 from .solver import Dirichlet
+from .triangles import by_parts, corners_of, normals
 from .weights import cotangent, mean_value, uniform
 
 _WEIGHTS = {"UNIFORM": uniform, "HARMONIC": cotangent, "MEAN_VALUE": mean_value}
@@ -45,27 +46,32 @@ def _fit(z, chosen, target):
 
 def project(surface):
     """Projection of every piece on its least-squares plane, seen from the side that its faces turn to, (n, 2)."""
-    a, b, c = surface.vertices[surface.triangles].transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    share = np.linalg.norm(normal, axis=1, keepdims=True)
-    starts, piece = surface.triangle_starts, surface.piece
-    share /= np.add.reduceat(share, starts)[piece]
-    centre = np.add.reduceat(share * (a + b + c), starts) / 3
-    # The second moments of a triangle are those of its corners and of three times its centre, each a twelfth.
-    points = [corner - centre[piece] for corner in (a, b, c)]
-    points.append(sum(points))
-    moments = sum(np.add.reduceat((share * p)[:, :, None] * p[:, None], starts) for p in points)
-    axes = np.linalg.eigh(moments)[1]  # the least extent comes first
-    across, right = axes[:, :, 0], axes[:, :, 2]
-    back = (np.add.reduceat(normal, starts) * across).sum(axis=1) < 0
+
+    def moments(corner):
+        corners = corners_of(surface.vertices, corner.T)
+        normal = normals(corners).T
+        share = np.linalg.norm(normal, axis=0)
+        # The second moments of a triangle are those of its corners and of three times its centre, each a twelfth.
+        x, y, z = (np.vstack([along, along.sum(axis=0)]) for along in corners.T)
+        pairs = (x, x), (x, y), (x, z), (y, y), (y, z), (z, z)
+        second = [share * (one * other).sum(axis=0) / 12 for one, other in pairs]
+        return np.array([*normal, share, *(share * along[3] / 3 for along in (x, y, z)), *second])
+
+    total = np.add.reduceat(by_parts(moments, surface.triangles.T), surface.triangle_starts, axis=1)
+    normal, middle, second = total[:3], total[4:7] / total[3], total[7:] / total[3]
+    xx, xy, xz, yy, yz, zz = second - middle[[0, 0, 0, 1, 1, 2]] * middle[[0, 1, 2, 1, 2, 2]]
+    axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).T)[1]
+    across, right = axes[:, :, 0], axes[:, :, 2]  # the least and the most extent
+    back = (normal.T * across).sum(axis=1) < 0
     across = np.where(back[:, None], -across, across)
     # Of the two ways round, the one with the farther end to the right: it turns with the surface.
     piece, starts = surface.vertex_piece, surface.vertex_starts
-    along = (surface.vertices * right[piece]).sum(axis=1)
+    along = np.einsum("ij,ij->i", surface.vertices, right[piece])
     left = np.maximum.reduceat(along, starts) < -np.minimum.reduceat(along, starts)
     right = np.where(left[:, None], -right, right)
     along = np.where(left[piece], -along, along)
-    return np.column_stack([along, (surface.vertices * np.cross(across, right)[piece]).sum(axis=1)])
+    up = np.cross(across, right)
+    return np.array([along, np.einsum("ij,ij->i", surface.vertices, up[piece])]).T
 
 
 def conformal(surface):

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-MANY = 100_000  # vertices: fewer fit into the processor's cache
+MANY = 40_000  # vertices: fewer fit into the processor's cache
 
 
 class Sorted:

@@ -7,6 +7,7 @@ import numpy as np
 
 from .errors import SettingsError
 from .tensor import area_scale, jacobian
+from .triangles import box
 from .validity import Repair, invalid
 from .weights import scheme
 
@@ -71,7 +72,7 @@ def iterate(domain, settings, uv, n):
         else:
             uv = domain.dirichlet.solve(weights)
             valid = not invalid(domain.surface, uv).any()
-        change = float(np.linalg.norm((uv - previous)[:n], axis=1).max() / diameter(uv[:n]))
+        change = movement(previous[:n], uv[:n])
         converged = change <= settings.tolerance and not repair.shortened
         yield State(iteration, uv, change, valid, converged, repair.active)
 
@@ -93,9 +94,11 @@ def check_settings(settings):
         )
 
 
-def diameter(uv):
-    """The diagonal of the layout's bounding box, never zero."""
-    return max(float(np.linalg.norm(np.ptp(uv, axis=0))), np.finfo(float).tiny)
+def movement(before, after):
+    """The largest movement of a vertex by the diagonal of the box around the map `after` (n, 2)."""
+    x, y = (after - before).T
+    diagonal = max(np.linalg.norm(box(after)[1]), np.finfo(float).tiny)
+    return float(np.sqrt((x * x + y * y).max()) / diagonal)
 
 
 def exponents(balance):

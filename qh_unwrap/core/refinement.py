@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from .surface import Surface, corner_angles
+from .surface import Surface
+from .triangles import corner_angles
 from .weights import cotangent
 
 _NEGATIVE = -1e-9

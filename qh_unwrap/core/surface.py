@@ -11,11 +11,8 @@ from scipy.sparse.csgraph import connected_components
 from . import errors
 from .pieces import first_and_last, numbers
 from .solver import banded, nested_dissection
+from .triangles import areas_in_space, corner_angles, corners_of, hat_gradients, laid_flat, signed_areas
 
-# A triangle lower than this part of its longest edge has no area, for all that single precision can tell.
-_FLATTEST = 1e-6
-# It is laid out with this part as its height: enough to stay valid in a map, too little to bend it.
-_THICKENED = 1e-2
 _KEYS = 2_000_000  # three numbers below it go into one of 64 bits
 
 
@@ -56,7 +53,8 @@ class Surface:
         self._check_edges()
         self.loops = self._boundary_loops()
         self._check_topology()
-        self.flat, self.degenerate = _isometric_corners(self.vertices[triangles])
+        size = np.sqrt(len(self.vertex_starts) / len(triangles))  # every piece has the area 1
+        self.flat, self.degenerate = laid_flat(self.vertices, triangles, size)
         self.area = signed_areas(self.flat)
         self.air = np.zeros(len(triangles), bool)
 
@@ -66,12 +64,11 @@ class Surface:
 
     def _normalise(self, vertices):
         count = np.diff(self.vertex_starts, append=len(vertices))
-        middle = np.add.reduceat(vertices, self.vertex_starts) / count[:, None]
-        centred = vertices - middle[self.vertex_piece]
+        middle = np.add.reduceat(vertices.T, self.vertex_starts, axis=1) / count
+        centred = (vertices.T - middle[:, self.vertex_piece]).T
         extent = np.maximum.reduceat(np.abs(centred).max(axis=1), self.vertex_starts)
         centred /= np.where(extent > 0, extent, 1)[self.vertex_piece, None]
-        a, b, c = np.moveaxis(centred[self.triangles], 1, 0)
-        area = self.sums(np.linalg.norm(np.cross(b - a, c - a), axis=1)) / 2
+        area = self.sums(areas_in_space(centred, self.triangles))
         if not (area > 1e-14).all():
             wrong = np.flatnonzero((area <= 1e-14)[self.piece])
             raise errors.DegenerateError("all its faces have zero area: there is nothing to unwrap", wrong)
@@ -87,7 +84,9 @@ class Surface:
             )
         if not np.bincount(triangles.ravel(), minlength=n).all():
             raise errors.LooseVertexError("some vertices belong to no face: delete the loose vertices")
-        a, b, c = np.sort(triangles, axis=1).T
+        corners = triangles.T
+        a, c = corners.min(axis=0), corners.max(axis=0)
+        b = corners.sum(axis=0) - a - c
         if n < _KEYS and np.diff(np.sort((a * n + b) * n + c)).all():
             return
         order = np.lexsort((c, b, a))
@@ -121,7 +120,7 @@ class Surface:
         """Make `edges` and `triangle_edges`; returns how many triangles each edge has."""
         n = len(self.vertices)
         unique, edge, count = np.unique(_edge_keys(self.triangles, n), return_inverse=True, return_counts=True)
-        self.edges = np.column_stack(np.divmod(unique, n))
+        self.edges = np.array(np.divmod(unique, n)).T
         self.triangle_edges = edge.reshape(3, -1).T
         return count
 
@@ -221,7 +220,7 @@ class Surface:
     @cached_property
     def angle_sums(self):
         """The sum of the triangles' angles at every vertex, (n,), in radians."""
-        return np.bincount(self.triangles.ravel(), corner_angles(self.flat).ravel(), len(self.vertices))
+        return np.bincount(self.triangles.T.ravel(), corner_angles(self.flat).T.ravel(), len(self.vertices))
 
     def filled(self, air=False):
         """The surface with every hole (all loops but the longest) closed by a fan; its first triangles are ours.
@@ -242,7 +241,7 @@ class Surface:
         """The surface with `triangles` (t, 3) of air, whose vertices in the layout `uv` follow its own."""
         wider = copy.copy(self)
         wider.vertices = np.pad(self.vertices, ((0, len(uv) - len(self.vertices)), (0, 0)))
-        wider.triangles = np.vstack([self.triangles, triangles])
+        wider.triangles = np.hstack([self.triangles.T, triangles.T]).T
         rim = self.half_edge_edges[self.on_boundary]
         key = np.concatenate([self.edges[rim] @ [len(uv), 1], _edge_keys(triangles, len(uv))])
         unique, edge = np.unique(key, return_inverse=True)
@@ -250,10 +249,10 @@ class Surface:
         number[edge[: len(rim)]] = rim
         new = number < 0
         number[new] = len(self.edges) + np.arange(new.sum())
-        wider.edges = np.vstack([self.edges, np.column_stack(np.divmod(unique[new], len(uv)))])
-        wider.triangle_edges = np.vstack([self.triangle_edges, number[edge[len(rim) :]].reshape(3, -1).T])
+        wider.edges = np.hstack([self.edges.T, np.divmod(unique[new], len(uv))]).T
+        wider.triangle_edges = np.hstack([self.triangle_edges.T, number[edge[len(rim) :]].reshape(3, -1)]).T
         some_shape = np.broadcast_to([[0.0, 0], [1, 0], [0, 1]], (len(triangles), 3, 2))
-        wider.flat = np.concatenate([self.flat, some_shape])
+        wider.flat = np.concatenate([self.flat.T, some_shape.T], axis=2).T
         wider.hats = np.concatenate([self.hats, hat_gradients(some_shape)], axis=2)
         wider.area, wider.degenerate = (np.pad(each, (0, len(triangles))) for each in (self.area, self.degenerate))
         wider.air = np.pad(self.air, (0, len(triangles)), constant_values=True)
@@ -266,15 +265,15 @@ class Surface:
         """The corners (m, 3, 2) of the surface's triangles laid flat, and of air where the layout has it."""
         if not self.air.any():
             return self.flat
-        return np.where(self.air[:, None, None], uv[self.triangles], self.flat)
+        return np.where(self.air, corners_of(uv, self.triangles).T, self.flat.T).T
 
 
 def checked_arrays(vertices, triangles):
     """Both as arrays of finite floats (n, 3) and of indices (m, 3); raises `SurfaceError`."""
     try:
-        vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+        vertices = np.asfortranarray(vertices, dtype=np.float64)
         indices = np.asarray(triangles)
-        triangles = np.ascontiguousarray(indices, dtype=np.int64)
+        triangles = np.asfortranarray(indices, dtype=np.int64)
     except (TypeError, ValueError) as error:
         raise errors.ShapeError(f"vertices and triangles must be arrays of numbers: {error}") from None
     if vertices.ndim != 2 or vertices.shape[1] != 3:
@@ -303,46 +302,6 @@ def _edge_keys(triangles, n):
     """One number for the edge of every half-edge, (3 m,): the smaller vertex times n, and the larger."""
     start, end = _half_edges(triangles)
     return np.minimum(start, end) * n + np.maximum(start, end)
-
-
-def _isometric_corners(corners):
-    """Lay triangles (m, 3, 3) in the plane: (m, 3, 2), and which of them were too flat and were given a height."""
-    m = len(corners)
-    length = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    base = np.argmax(length, axis=1)
-    rows = np.arange(m)
-    order = (base[:, None] + np.arange(3)) % 3
-    a, b, c = (corners[rows, order[:, k]] for k in range(3))
-    longest = np.maximum(length[rows, base], _FLATTEST * length.mean())
-    along = np.einsum("ij,ij->i", b - a, c - a) / longest
-    height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / longest
-    degenerate = height < _FLATTEST * longest
-    flat = np.zeros((m, 3, 2))
-    flat[rows, order[:, 1], 0] = longest
-    flat[rows, order[:, 2], 0] = along
-    flat[rows, order[:, 2], 1] = np.where(degenerate, _THICKENED * longest, height)
-    return flat, degenerate
-
-
-def signed_areas(corners):
-    """Signed areas of plane triangles (m, 3, 2), positive counter-clockwise."""
-    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    return 0.5 * (ax * by - ay * bx)
-
-
-def hat_gradients(corners):
-    """Gradients of the hat functions of the second and third corners of plane triangles (m, 3, 2), (2, 2, m)."""
-    (a, c), (b, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    det = a * d - b * c
-    return np.array([[d / det, -b / det], [-c / det, a / det]])
-
-
-def corner_angles(corners):
-    """Interior angles of plane triangles (m, 3, 2), at each corner (m, 3), in radians."""
-    ahead = np.roll(corners, -1, axis=1) - corners
-    back = np.roll(corners, 1, axis=1) - corners
-    cross = ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]
-    return np.arctan2(np.abs(cross), (ahead * back).sum(axis=2))
 
 
 def _components(count, one, other):

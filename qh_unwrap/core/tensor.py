@@ -11,6 +11,8 @@ values are the eigenvalues of `G^T G`; the paper's first fundamental form (eq. 4
 
 import numpy as np
 
+from .triangles import by_parts, corners_of
+
 _SMALLEST = 1e-12  # squared stretches, and their ratios, are kept within this and its inverse
 
 
@@ -21,10 +23,15 @@ def jacobian(surface, uv):
 
 def jacobian_of(corners, hats, uv):
     """The same for triangles with the `corners` (3, m) and the `hats` that a surface has, (2, 2, m)."""
-    x, y = uv[:, 0][corners], uv[:, 1][corners]
-    (ax, bx), (ay, by) = x[1:] - x[0], y[1:] - y[0]
-    (h1, h2), (k1, k2) = hats
-    return np.array([[ax * h1 + bx * k1, ax * h2 + bx * k2], [ay * h1 + by * k1, ay * h2 + by * k2]])
+    uv = np.asfortranarray(uv)
+
+    def derivative(corners, hats):
+        x, y = corners_of(uv, corners.T).T
+        (ax, bx), (ay, by) = x[1:] - x[0], y[1:] - y[0]
+        (h1, h2), (k1, k2) = hats
+        return np.array([[ax * h1 + bx * k1, ax * h2 + bx * k2], [ay * h1 + by * k1, ay * h2 + by * k2]])
+
+    return by_parts(derivative, corners, hats)
 
 
 def area_scale(surface, jacobian):
@@ -46,17 +53,21 @@ def squared_stretches(surface, uv, side="right", smallest=_SMALLEST):
     """
     G = jacobian(surface, uv)
     scale = area_scale(surface, G)
-    (g11, g12), (g21, g22) = G if side == "right" else G.swapaxes(0, 1)
-    a, b, c = g11**2 + g21**2, g12**2 + g22**2, g11 * g12 + g21 * g22
-    half_difference, mean = (a - b) / 2, (a + b) / 2
-    radius = np.hypot(half_difference, c)
-    larger = mean + radius
-    det = (g11 * g22 - g12 * g21) ** 2
-    smaller = det / np.maximum(larger, np.finfo(float).tiny)  # not mean - radius, which cancels
-    radius = np.maximum(radius, np.finfo(float).tiny)  # a multiple of the identity has no direction: any will do
-    larger, smaller = (np.clip(value / scale, smallest, 1 / smallest) for value in (larger, smaller))
-    smaller = np.maximum(smaller, smallest * larger)
-    return larger, smaller, half_difference / radius, c / radius
+
+    def stretches(G, scale):
+        (g11, g12), (g21, g22) = G if side == "right" else G.swapaxes(0, 1)
+        a, b, c = g11**2 + g21**2, g12**2 + g22**2, g11 * g12 + g21 * g22
+        half_difference, mean = (a - b) / 2, (a + b) / 2
+        radius = np.hypot(half_difference, c)
+        larger = mean + radius
+        det = (g11 * g22 - g12 * g21) ** 2
+        tiny = np.finfo(float).tiny
+        lesser = det / np.maximum(larger, tiny)  # not mean - radius, which cancels
+        radius = np.maximum(radius, tiny)  # a multiple of the identity has no direction: any will do
+        larger, lesser = (np.clip(value / scale, smallest, 1 / smallest) for value in (larger, lesser))
+        return larger, np.maximum(lesser, smallest * larger), half_difference / radius, c / radius
+
+    return by_parts(stretches, G, scale)
 
 
 def surface_tensor(surface, uv, balance, power=1.0):

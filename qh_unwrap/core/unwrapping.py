@@ -12,11 +12,12 @@ from .distortion import Distortion, checked_uv, measure
 from .errors import BoundaryError, PinError, SurfaceError, UVError
 from .exterior import Exterior
 from .initial import conformal, fit, initial_map, project
-from .quasi_harmonic import Held, State, check_settings, diameter, energy, iterate
+from .quasi_harmonic import Held, State, check_settings, energy, iterate, movement
 from .settings import Settings
 from .solver import Dirichlet
 from .stepping import finished, mapped
 from .surface import Surface, checked_arrays
+from .triangles import box
 from .validity import enclosed_area, invalid, is_injective
 
 _HANDOVER = 0.9  # an iteration that lowers the energy by less than this part of it gives way to the refinement
@@ -183,7 +184,7 @@ def _improved(surface, domain, settings, start, placed):
         steps = () if refined is None else descend(domain, settings.balance, settings.refine, refined)
         previous = uv[:n]
         for number, (refined, done) in enumerate(steps, start=last.iteration + 1):
-            change = float(np.linalg.norm(refined[:n] - previous, axis=1).max() / diameter(refined[:n]))
+            change = movement(previous, refined[:n])
             valid = not invalid(surface, placed(refined[:n])).any()
             yield State(number, refined, change, valid, bool(done.all()), state.repaired)
             previous = refined[:n]
@@ -193,7 +194,8 @@ def _improved(surface, domain, settings, start, placed):
 
 
 def _in_unit_square(uv):
-    return (uv - uv.min(axis=0)) / np.ptp(uv, axis=0).max()
+    low, size = box(uv)
+    return (uv - low) / size.max()
 
 
 def _checked_pins(surface, pinned):

@@ -5,6 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from .triangles import by_parts, corners_of
+
 _FLOOR = 0.1
 _ROUNDS = 8
 _HALVINGS = 10
@@ -13,8 +15,8 @@ _PORTION = 1_000_000  # pairs at a time
 
 def turn(a, b, c):
     """1 where the points a, b, c (n, 2) turn left, -1 where they turn right, 0 where they lie on a line: exactly."""
-    first = (b - a)[:, 0] * (c - a)[:, 1]
-    second = (b - a)[:, 1] * (c - a)[:, 0]
+    (bx, by), (cx, cy) = (b - a).T, (c - a).T
+    first, second = bx * cy, by * cx
     apart = first - second
     result = np.sign(apart).astype(np.int8)
     # Where the two nearly cancel, rounding decides (Shewchuk 1997 bounds the error): then look closer.
@@ -59,8 +61,8 @@ def as_stored(uv):
 
 def orientation(uv, triangles):
     """1 for triangles that follow their winding, -1 for flipped, 0 for collapsed ones, (m,), in 32-bit floats."""
-    a, b, c = (as_stored(uv)[corner] for corner in triangles.T)
-    return turn(a, b, c)
+    stored = np.asfortranarray(as_stored(uv))
+    return by_parts(lambda corner: turn(*corners_of(stored, corner.T).swapaxes(0, 1)), triangles.T)
 
 
 def is_injective(uv, triangles, loops):

@@ -7,8 +7,8 @@ of i in the equation of j.  In all equations `sum_j w_ij (f_i - f_j) = 0` (eq. 2
 
 import numpy as np
 
-from .surface import signed_areas
 from .tensor import plane_tensor, scalar_tensor, squared_stretches, surface_tensor
+from .triangles import by_parts, corners_of, signed_areas
 
 
 def uniform(surface):
@@ -22,18 +22,22 @@ def cotangent(surface, tensor=None, corners=None):
     `tensor` (3, m) is constant on each triangle; None is the identity, which gives the cotangents.
     """
     corners = surface.flat if corners is None else corners
-    x, y = corners[..., 0].T, corners[..., 1].T
-    ex, ey = np.roll(x, -1, axis=0) - x, np.roll(y, -1, axis=0) - y  # edge c runs from corner c to c + 1
-    fx, fy = np.roll(ex, -1, axis=0), np.roll(ey, -1, axis=0)
-    gx, gy = np.roll(ex, -2, axis=0), np.roll(ey, -2, axis=0)
-    if tensor is None:
-        product = fx * gx + fy * gy
-    else:
-        a, b, c = tensor
-        product = b * fx * gx - c * (fx * gy + fy * gx) + a * fy * gy
     area = np.abs(signed_areas(corners))
-    half_edge_weights = product / (-4 * np.maximum(area, 1e-12 * area.max()))
-    w = np.bincount(surface.triangle_edges.T.ravel(), half_edge_weights.ravel(), len(surface.edges))
+    least = 1e-12 * area.max()
+
+    def half_edge_weights(corners, area, *tensor):
+        ex, ey = np.roll(corners, -1, axis=1) - corners  # edge c runs from corner c to c + 1
+        fx, fy = np.roll(ex, -1, axis=0), np.roll(ey, -1, axis=0)
+        gx, gy = np.roll(ex, -2, axis=0), np.roll(ey, -2, axis=0)
+        if tensor:
+            a, b, c = tensor[0]
+            product = b * fx * gx - c * (fx * gy + fy * gx) + a * fy * gy
+        else:
+            product = fx * gx + fy * gy
+        return product / (-4 * np.maximum(area, least))
+
+    fields = (corners.T, area) if tensor is None else (corners.T, area, tensor)
+    w = np.bincount(surface.triangle_edges.T.ravel(), by_parts(half_edge_weights, *fields).ravel(), len(surface.edges))
     return np.stack([w, w])
 
 
@@ -85,7 +89,7 @@ def _appendix_a(a, b, c, sin, tan_half):
 def _directed(surface, at_start, at_end):
     # Sum the weights that half-edges (3, m) give to the equations of their start and of their end.
     start, end = surface.half_edges
-    edge, k = surface.triangle_edges.T.ravel(), len(surface.edges)
+    edge, k = surface.half_edge_edges, len(surface.edges)
     forward = start < end
     at_start, at_end = at_start.ravel(), at_end.ravel()
     return np.stack(
@@ -130,7 +134,7 @@ def scheme(settings):
     def mean_value_weights(domain, uv):
         surface = domain.surface
         tensor = plane_tensor if settings.weights == "MEAN_VALUE" else scalar_tensor
-        return mean_value(surface, tensor(surface, uv, t, q), uv[surface.triangles])
+        return mean_value(surface, tensor(surface, uv, t, q), corners_of(uv, surface.triangles))
 
     if settings.weights == "STRETCH":
         return Stretch()

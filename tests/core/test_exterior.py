@@ -4,8 +4,8 @@ import pytest
 
 from qh_unwrap.core import Settings, Surface, distortion, errors, unwrap
 from qh_unwrap.core.exterior import Exterior, _within, make_air
-from qh_unwrap.core.surface import signed_areas
 from qh_unwrap.core.tensor import surface_tensor
+from qh_unwrap.core.triangles import signed_areas
 from qh_unwrap.core.validity import is_injective
 
 from . import shapes

@@ -4,7 +4,7 @@ import pytest
 
 from qh_unwrap.core import Surface, distortion
 from qh_unwrap.core.initial import conformal, fit, project
-from qh_unwrap.core.surface import signed_areas
+from qh_unwrap.core.triangles import signed_areas
 
 from . import shapes
 

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core import Surface, errors
-from qh_unwrap.core.surface import signed_areas
+from qh_unwrap.core.triangles import signed_areas
 
 from . import shapes
 

@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qh_unwrap.core import Surface
-from qh_unwrap.core.surface import signed_areas
 from qh_unwrap.core.tensor import jacobian, plane_tensor, scalar_tensor, surface_tensor
+from qh_unwrap.core.triangles import signed_areas
 from qh_unwrap.core.weights import cotangent
 
 from . import shapes

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qh_unwrap.core import Settings, Surface, UnwrapError, distortion, errors, locality, unwrap, unwrap_steps
+from qh_unwrap.core import triangles as arithmetic
 from qh_unwrap.core.distortion import measure
 from qh_unwrap.core.initial import fit
 from qh_unwrap.core.stepping import finished, mapped
@@ -291,6 +292,15 @@ def test_the_report_is_plain_data():
     assert again["after"]["l2_stretch"] == report.after.l2_stretch
     assert again["iterations"] == len(again["changes"])
     assert issubclass(UnwrapError, ValueError)
+
+
+def test_work_on_parts_changes_nothing(monkeypatch):
+    mesh = shapes.bump(6, inner=200, outer=40)
+    whole = unwrap(*mesh, triangulate=triangulate)
+    monkeypatch.setattr(arithmetic, "_AT_ONCE", 7)
+    parts = unwrap(*mesh, triangulate=triangulate)
+    np.testing.assert_allclose(parts.uv, whole.uv, rtol=0, atol=1e-12)
+    assert parts.report.after.to_dict() == pytest.approx(whole.report.after.to_dict(), rel=1e-9)
 
 
 def test_large_meshes_are_sorted_and_their_results_put_back(monkeypatch):

@@ -7,7 +7,7 @@ from scipy.integrate import quad
 
 from qh_unwrap.core import Settings, Surface
 from qh_unwrap.core.quasi_harmonic import Held
-from qh_unwrap.core.surface import corner_angles, signed_areas
+from qh_unwrap.core.triangles import corner_angles, signed_areas
 from qh_unwrap.core.weights import _appendix_a, cotangent, mean_value, scheme, uniform
 
 from . import shapes
