@@ -9,8 +9,8 @@ from scipy.sparse.linalg import LinearOperator, cg, splu
 _STEPS = 100
 _LARGE = 1000  # unknowns, of which factorizing takes so long that single precision or an old matrix is tried first,
 _PATIENCE = 12  # the latter for so many steps
-_HUGE = 200_000  # unknowns, of which it pays to correct solutions in single precision
-_EXACT = 1e-9  # a correction of a solution by this part of it is not needed
+_HUGE = 30_000  # unknowns, of which it pays to factorize in single precision and to correct solutions,
+_EXACT = 1e-7  # until the next correction would be by this part of them
 _CORRECTIONS = 6
 _LEAF = 32
 _FEW = 300  # vertices whose order hardly matters
@@ -123,7 +123,7 @@ class _Factors:
             return self._factors.solve(rhs.astype(self._kind, copy=False)).astype(np.float64, copy=False)
 
     def solve_exactly(self, rhs):
-        """To double precision, by corrections (Wilkinson's iterative refinement)."""
+        """As exactly as positions need it, by corrections (Wilkinson's iterative refinement) in single precision."""
         solution = self.solve(rhs)
         if self._kind == np.float64:
             return solution
@@ -132,7 +132,7 @@ class _Factors:
             correction = self.solve(rhs - self._matrix @ solution)
             solution += correction
             before, size = size, np.linalg.norm(correction)
-            if size == 0 or size * (size / before) <= _EXACT * np.linalg.norm(solution):  # as the next one will be
+            if size == 0 or size * (size / before) <= _EXACT * np.linalg.norm(solution):
                 return solution
         self.sharpened()
         return self.solve(rhs)
