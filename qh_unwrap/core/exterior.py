@@ -6,10 +6,9 @@ it, as far as a fixed circle, the identity.  Where all are positive, the whole p
 """
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from .pieces import components
 from .solver import Dirichlet
 from .triangles import corners_of, signed_areas
 from .validity import orientation
@@ -187,7 +186,7 @@ def _outside(triangles, sides, n):
     inner = inner[np.argsort(edge[inner], kind="stable")]
     twins = edge[inner[1:]] == edge[inner[:-1]]
     one, other = owner[inner[:-1][twins]], owner[inner[1:][twins]]
-    part = connected_components(coo_array((np.ones(len(one), bool), (one, other)), shape=(m, m)), directed=False)[1]
+    part = components(m, one, other)[1]
     outside = np.isin(part, part[owner[against_side]])
     if against_side.sum() != len(sides) or outside[owner[with_side]].any():
         return None

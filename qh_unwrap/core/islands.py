@@ -9,10 +9,8 @@ inside an island opens it, and a vertex where two fans of faces merely touch is 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from .pieces import first_and_last
+from .pieces import components, first_and_last
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
     chosen_corners = np.flatnonzero(selected[corner_face])
     one, start, end = _across_edges(corner_vertex, corner_edge, following, seam, chosen_corners)
     uv_vertex = _uv_vertices(one, start, end, following)
-    face_island = _components(face_count, corner_face[one], corner_face[start])
+    face_island = components(face_count, corner_face[one], corner_face[start])[1]
 
     corner_triangles = _without_doubled_diagonals(corner_triangles, following, uv_vertex)
     chosen = np.flatnonzero(selected)
@@ -136,7 +134,7 @@ def _across_edges(corner_vertex, corner_edge, following, seam, corners):
 
 def _uv_vertices(one, start, end, following):
     """The UV vertex of each corner, where faces hang together as `_across_edges` says."""
-    return _components(len(following), np.concatenate([one, following[one]]), np.concatenate([start, end]))
+    return components(len(following), np.concatenate([one, following[one]]), np.concatenate([start, end]))[1]
 
 
 def _without_doubled_diagonals(triangles, following, uv_vertex):
@@ -169,11 +167,6 @@ def _flipped(triangles, rows):
             triangles[one], triangles[other] = (h, j, k), (h, k, i)
             touched |= {one, other}
     return triangles
-
-
-def _components(count, one, other):
-    links = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(count, count))
-    return connected_components(links, directed=False)[1]
 
 
 def _grouped(items, rank):

@@ -2,6 +2,8 @@
 """Arrays of several pieces laid end to end, and where each begins."""
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 
 def starts_of(arrays):
@@ -19,6 +21,12 @@ def first_and_last(items, place, count):
     first, last = np.empty((2, count), items.dtype)
     first[place[::-1]], last[place] = items[::-1], items
     return first, last
+
+
+def components(count, one, other):
+    """How many parts things fall into that are linked in pairs, and that of each, (count,)."""
+    links = coo_array((np.ones(len(one), bool), (one, other)), shape=(count, count))
+    return connected_components(links, directed=False)
 
 
 def joined(points, triangles):

@@ -6,12 +6,12 @@ from scipy.sparse import bsr_array, coo_array, csc_array
 from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mckee
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
-_STEPS = 100
-_LARGE = 1000  # unknowns, of which factorizing takes so long that single precision or an old matrix is tried first,
-_PATIENCE = 12  # the latter for so many steps
-_HUGE = 30_000  # unknowns, of which it pays to factorize in single precision and to correct solutions,
+_STEPS = 100  # of conjugate gradients
+_LARGE = 1000  # unknowns, for which an old factorization is tried first, and new ones are in single precision
+_PATIENCE = 12  # steps with an earlier factorization
+_HUGE = 30_000  # unknowns, for which it pays to solve in single precision and to correct the solutions,
+_CORRECTIONS = 6  # at most so many times,
 _EXACT = 1e-7  # until the next correction would be by this part of them
-_CORRECTIONS = 6
 _LEAF = 32
 _FEW = 300  # vertices whose order hardly matters
 
@@ -41,7 +41,7 @@ class System:
         self._mean = None
 
     def factor(self, forward, backward, diagonal):
-        """A solver of right-hand sides (n, ...) for the matrix."""
+        """A solver of right-hand sides (n, ...) for the matrix; of a huge one until seven digits stand."""
         entries = np.concatenate([forward, backward, diagonal])[self._entry]
         factors = self._factors(entries, single=len(self._order) >= _HUGE)
 

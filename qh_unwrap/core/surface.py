@@ -5,11 +5,9 @@ import copy
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from . import errors
-from .pieces import first_and_last, numbers
+from .pieces import components, first_and_last, numbers
 from .solver import banded, nested_dissection
 from .triangles import areas_in_space, corner_angles, corners_of, hat_gradients, laid_flat, signed_areas
 
@@ -131,7 +129,7 @@ class Surface:
         following = (corner + m) % (3 * m)
         first, second = self._twins
         link = np.concatenate([first, following[first]]), np.concatenate([following[second], second])
-        fans, fan = _components(3 * m, *link)
+        fans, fan = components(3 * m, *link)
         if fans > len(self.vertices):
             fans_at = np.bincount(self.triangles.T.ravel()[np.unique(fan, return_index=True)[1]])
             wrong = fans_at > 1
@@ -150,11 +148,11 @@ class Surface:
         excess = 2 - loops - (vertices - edges + triangles)
         m = len(self.triangles)
         first, second = self._twins
-        found, part = _components(m, first % m, second % m)
+        found, part = components(m, first % m, second % m)
         if found == p and len(np.unique(part * p + self.piece)) == p and loops.all() and not excess.any():
             return
         self._check_vertices()
-        found, part = _components(n, *self.edges.T)
+        found, part = components(n, *self.edges.T)
         if found != p or len(np.unique(part * p + self.vertex_piece)) > p:
             raise errors.DisconnectedError(f"it has {found} separate pieces: unwrap each on its own")
         if not loops.all():
@@ -302,12 +300,6 @@ def _edge_keys(triangles, n):
     """One number for the edge of every half-edge, (3 m,): the smaller vertex times n, and the larger."""
     start, end = _half_edges(triangles)
     return np.minimum(start, end) * n + np.maximum(start, end)
-
-
-def _components(count, one, other):
-    """How many parts things fall into that are linked in pairs, and that of each, (count,)."""
-    links = coo_array((np.ones(len(one), bool), (one, other)), shape=(count, count))
-    return connected_components(links, directed=False)
 
 
 def edge_lengths(points):
