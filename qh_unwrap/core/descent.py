@@ -126,9 +126,9 @@ class _Energy:
         return 1 / np.maximum(largest, 1e-300)
 
     def derivatives(self, jacobian):
-        """The gradient by the corners (2, 3, m), and the Hessian's blocks of the corners c and c + 1, (4, 3, m).
+        """The gradient by the corners' u and v, and the Hessian's blocks of the corners c and c + 1: (3, m) each.
 
-        The rows (mean, difference, symmetric, antisymmetric) make up the blocks [[m + d, s - a], [s + a, m - d]].
+        Four parts (mean, difference, symmetric, antisymmetric) make up the blocks [[m + d, s - a], [s + a, m - d]].
         """
         return by_parts(self._derivatives, jacobian, self._hats, self._weight)
 
@@ -164,7 +164,7 @@ class _Energy:
         k1, k2 = np.roll(h1, -1, axis=0), np.roll(h2, -1, axis=0)
         cos, sin = np.cos(left), np.sin(left)
         along, across = value * g1 * h1, value * g2 * h2
-        gradient = np.array([cos * along - sin * across, sin * along + cos * across])
+        gradient = cos * along - sin * across, sin * along + cos * across
 
         # The blocks in the frame of the left singular vectors; turned, only the second and third row change
         long, short = value / 2 * h1 * k1, value / 2 * h2 * k2
@@ -172,15 +172,13 @@ class _Energy:
         difference = (f11 - both) * long - (f22 - both) * short
         symmetric = (f12 + skew) * (one + other)
         cos, sin = np.cos(2 * left), np.sin(2 * left)
-        blocks = np.array(
-            [
-                (f11 + both) * long + (f22 + both) * short,
-                difference * cos - symmetric * sin,
-                difference * sin + symmetric * cos,
-                (f12 - skew) * (other - one),
-            ]
+        return (
+            *gradient,
+            (f11 + both) * long + (f22 + both) * short,
+            difference * cos - symmetric * sin,
+            difference * sin + symmetric * cos,
+            (f12 - skew) * (other - one),
         )
-        return gradient, blocks
 
 
 def _with_first(hats):
@@ -200,20 +198,26 @@ def _positive(a, b, c):
 
 def _newton_direction(domain, energy, jacobian):
     """The gradient and the direction of descent, (n, 2) each, zero where held."""
+    gradient, hessian = _newton_system(domain, energy, jacobian)
+    free = domain.dirichlet.free
+    direction = np.zeros_like(gradient)
+    direction[free] = -domain.dirichlet.system.solve_blocks(hessian, gradient[free], _RESIDUAL)
+    return gradient, direction
+
+
+def _newton_system(domain, energy, jacobian):
+    """The gradient (n, 2), zero where held, and the Hessian's matrix of what is free."""
     surface, dirichlet = domain.surface, domain.dirichlet
     n, k, free = len(surface.vertices), len(surface.edges), dirichlet.free
-    by_corner, blocks = energy.derivatives(jacobian)
+    *by_corner, mean, difference, symmetric, anti = energy.derivatives(jacobian)
     gradient = np.zeros((n, 2))
-    for i in range(2):
-        gradient[free, i] = np.bincount(energy.corners.ravel(), by_corner[i].ravel(), n)[free]
+    for total, values in zip(gradient.T, by_corner, strict=True):
+        total[free] = np.bincount(energy.corners.ravel(), values.ravel(), n)[free]
 
     backward = energy.corners > np.roll(energy.corners, -1, axis=0)
-    blocks[3] = np.where(backward, -blocks[3], blocks[3])  # transposed: as seen from the smaller vertex
-    mean, difference, symmetric, anti = (np.bincount(energy.edges, block.ravel(), k) for block in blocks)
+    np.negative(anti, out=anti, where=backward)  # transposed: as seen from the smaller vertex
+    beside = [np.bincount(energy.edges, part.ravel(), k) for part in (mean, difference, symmetric, anti)]
     one, other = surface.edges.T
-    m, d, s = (-np.bincount(one, part, n) - np.bincount(other, part, n) for part in (mean, difference, symmetric))
-    diagonal = (m + d, s), (s, m - d)  # moving all vertices together changes nothing
-    beside = (mean + difference, symmetric - anti), (symmetric + anti, mean - difference)
-    direction = np.zeros((n, 2))
-    direction[free] = -dirichlet.system.solve_blocks(beside, diagonal, gradient[free], _RESIDUAL)
-    return gradient, direction
+    # Moving all vertices together changes nothing.
+    own = [-np.bincount(one, part, n) - np.bincount(other, part, n) for part in beside[:3]]
+    return gradient, dirichlet.system.block_matrix(beside, own)

@@ -11,8 +11,9 @@ _LARGE = 1000  # unknowns, for which an old factorization is tried first, and ne
 _PATIENCE = 12  # steps with an earlier factorization
 _HUGE = 30_000  # unknowns, for which it pays to solve in single precision and to correct the solutions,
 _CORRECTIONS = 6  # at most so many times,
-_EXACT = 1e-7  # until the next correction would be by this part of them
-_LEAF = 32
+_EXACT = 1e-6  # until the next correction would be by this part of them
+_AT_ONCE = 8192  # blocks: what is at work stays in the processor's cache
+_LEAF = 16
 _FEW = 300  # vertices whose order hardly matters
 
 
@@ -38,10 +39,10 @@ class System:
         pattern = coo_array((chosen, where), shape=(n, n)).tocsc()
         self._order = order
         self._entry, self._indices, self._indptr = pattern.data, pattern.indices, pattern.indptr
-        self._mean = None
+        self._mean = self._blocks = None
 
     def factor(self, forward, backward, diagonal):
-        """A solver of right-hand sides (n, ...) for the matrix; of a huge one until seven digits stand."""
+        """A solver of right-hand sides (n, ...) for the matrix; of a huge one until six digits stand."""
         entries = np.concatenate([forward, backward, diagonal])[self._entry]
         factors = self._factors(entries, single=len(self._order) >= _HUGE)
 
@@ -52,18 +53,32 @@ class System:
 
         return solve
 
-    def solve_blocks(self, beside, diagonal, rhs, residual):
-        """Solve a symmetric positive definite system of blocks until a `residual` by that part of `rhs` (n, 2).
+    def block_matrix(self, beside, own):
+        """The symmetric matrix for `solve_blocks` of 2 by 2 blocks [[m + d, s - a], [s + a, m - d]].
 
-        The blocks (i, j) are given as `beside`, 2 by 2 arrays (k,), and the blocks (i, i) likewise.  Conjugate
-        gradients, with the mean of both coordinates' own matrices as preconditioner.
+        `beside` is (m, d, s, a), (k,) each, of the blocks (i, j), and `own` (m, d, s), (n,) each, of the blocks (i, i),
+        which are symmetric.  Holds until the next one is made.
+        """
+        n, k = len(self._order), len(beside[0])
+        parts = [*map(np.concatenate, zip(beside, own, strict=False)), np.pad(beside[3], (0, len(own[0])))]
+        if self._blocks is None:
+            self._blocks = np.empty((len(self._entry), 2, 2))
+        for start in range(0, len(self._entry), _AT_ONCE):
+            entry = self._entry[start : start + _AT_ONCE]
+            blocks = self._blocks[start : start + _AT_ONCE]
+            m, d, s, a = (part[np.where(entry < k, entry, entry - k)] for part in parts)
+            # The pattern is by columns, and what stands there is taken for rows: transpose.
+            a = np.where(entry < k, -a, a)
+            blocks[:, 0, 0], blocks[:, 1, 1] = m + d, m - d
+            blocks[:, 0, 1], blocks[:, 1, 0] = s - a, s + a
+        return bsr_array((self._blocks, self._indices, self._indptr), shape=(2 * n, 2 * n))
+
+    def solve_blocks(self, matrix, rhs, residual):
+        """Solve a positive definite system of blocks until a `residual` by that part of `rhs` (n, 2).
+
+        Conjugate gradients, with the mean of both coordinates' own matrices as preconditioner.
         """
         n = len(self._order)
-        entries = np.empty((len(self._entry), 2, 2))
-        for r, c in np.ndindex(2, 2):
-            # The pattern is by columns and blocks are taken by rows: what stands at (i, j) is that of (j, i).
-            entries[:, r, c] = np.concatenate([beside[c][r], beside[r][c], diagonal[r][c]])[self._entry]
-        matrix = bsr_array((entries, self._indices, self._indptr), shape=(2 * n, 2 * n))
         rhs = rhs[self._order]
         solution = np.zeros(2 * n)
         tried, missed = self._mean is not None, True
@@ -71,7 +86,7 @@ class System:
             solution, missed = self._conjugate_gradients(matrix, rhs, residual, solution, _PATIENCE)
         if missed:
             self._mean = None  # before there is another: both would take twice the memory
-            self._mean = self._factors((entries[:, 0, 0] + entries[:, 1, 1]) / 2, single=n >= _LARGE)
+            self._mean = self._factors((matrix.data[:, 0, 0] + matrix.data[:, 1, 1]) / 2, single=n >= _LARGE)
             solution, missed = self._conjugate_gradients(matrix, rhs, residual, solution, _STEPS)
             if missed and self._mean.sharpened():
                 solution, _ = self._conjugate_gradients(matrix, rhs, residual, np.zeros(2 * n), _STEPS)
@@ -208,12 +223,11 @@ def nested_dissection(points, edges):
     if len(edges) and n <= _FEW:
         return banded(n, edges)
     levels = max(0, int(np.ceil(np.log2(max(n, 1) / _LEAF))))
-    kind = np.int16 if levels < 15 else np.int32  # the shorter ones are sorted faster
-    piece = np.zeros(n, kind)  # -1 once in a separator
+    piece = np.zeros(n, np.int16)  # -1 once in a separator
     key = np.zeros(n, dtype=np.int64)  # one base-3 digit a level: first half 0, second half 1, separator 2
     orders = [np.argsort(points[:, axis], kind="stable") for axis in range(axes)]
     i, j = edges.T.astype(np.intp, order="C")
-    for _ in range(levels):
+    for level in range(levels):
         half, orders = _halves(piece, orders, i, j)
         cut = half[i] != half[j]
         crossing = np.flatnonzero(cut)
@@ -222,7 +236,9 @@ def nested_dissection(points, edges):
         key *= 3
         key += np.where(inside, half, 0)
         key[separator] += 2 - half[separator]
-        piece = np.where(inside, 2 * piece + half, -1).astype(kind)
+        if level == 15:
+            piece = piece.astype(np.int32)  # shorter ones are sorted faster
+        piece = np.where(inside, 2 * piece + half, piece.dtype.type(-1))
         piece[separator] = -1
         inside = piece >= 0
         kept = np.flatnonzero(~cut & inside[i] & inside[j])

@@ -28,7 +28,7 @@ def bent(seed):
 def test_the_gradient_is_the_derivative_of_the_energy(seed, balance):
     surface, uv, direction = bent(seed)
     measure = _Energy(surface, uv, balance, np.array([1.3]))
-    gradient, _ = measure.derivatives(measure.jacobian(uv))
+    gradient = np.array(measure.derivatives(measure.jacobian(uv))[:2])
     total = np.zeros_like(uv)
     for corner in range(3):
         np.add.at(total, surface.triangles[:, corner], gradient[:, corner].T)
@@ -45,7 +45,7 @@ def test_the_hessian_is_that_of_the_energy_where_it_is_positive():
     uv = surface.vertices[:, :2] + 1e-4 * rng.normal(size=(len(vertices), 2))  # near the minimum nothing is clamped
     measure = _Energy(surface, uv, 0.25, np.ones(1))
     direction = rng.normal(size=uv.shape)
-    _, (mean, difference, symmetric, anti) = measure.derivatives(measure.jacobian(uv))
+    mean, difference, symmetric, anti = measure.derivatives(measure.jacobian(uv))[2:]
     blocks = np.array([[mean + difference, symmetric - anti], [symmetric + anti, mean - difference]])
     quadratic = 0.0
     for corner in range(3):

@@ -41,7 +41,22 @@ def test_everything_held():
     np.testing.assert_array_equal(dirichlet.solve(cotangent(surface)), values)
 
 
-def test_systems_of_blocks_are_solved_roughly():
+def solved(system, beside, diagonal, rhs, residual):
+    """Blocks are given as (k, 2, 2) for the edges and (n, 2, 2)."""
+    rows = [
+        np.array([a + d, a - d, b + c, c - b]) / 2
+        for (a, b), (c, d) in (blocks.transpose(1, 2, 0) for blocks in (beside, diagonal))
+    ]
+    return system.solve_blocks(system.block_matrix(rows[0], rows[1][:3]), rhs, residual)
+
+
+def scalar(values):
+    return np.asarray(values)[:, None, None] * np.eye(2)
+
+
+@pytest.mark.parametrize("at_once", [10, 8192])
+def test_systems_of_blocks_are_solved_roughly(monkeypatch, at_once):
+    monkeypatch.setattr(solver, "_AT_ONCE", at_once)
     surface = Surface(*shapes.bump(1))
     n = len(surface.vertices)
     rng = np.random.default_rng(1)
@@ -54,7 +69,7 @@ def test_systems_of_blocks_are_solved_roughly():
     matrix[np.arange(n), :, np.arange(n)] = diagonal
     rhs = rng.normal(size=(n, 2))
     for roughly in (0.3, 1e-6):
-        solution = System(surface.order, surface.edges).solve_blocks(off.transpose(1, 2, 0), diagonal.T, rhs, roughly)
+        solution = solved(System(surface.order, surface.edges), off, diagonal, rhs, roughly)
         residual = np.einsum("iajb,jb->ia", matrix, solution) - rhs
         assert np.linalg.norm(residual) <= roughly * np.linalg.norm(rhs)
         assert (solution * rhs).sum() > 0
@@ -73,10 +88,9 @@ def test_an_earlier_factorization_serves_or_is_replaced(monkeypatch):
     rhs = rng.normal(size=(n, 2))
     first, near, far = (10 ** (spread * rng.random(len(i))) for spread in (0, 0.01, 6))
     for weight, count in ((first, 1), (near, 1), (far, 2), (far, 3), (far, 3)):
-        off = -weight * np.eye(2)[:, :, None]
-        diagonal = (1e-3 + np.bincount(i, weight, n) + np.bincount(j, weight, n)) * np.eye(2)[:, :, None]
-        solution = system.solve_blocks(off, diagonal, rhs, 1e-6)
-        product = diagonal[0, 0, :, None] * solution
+        diagonal = 1e-3 + np.bincount(i, weight, n) + np.bincount(j, weight, n)
+        solution = solved(system, scalar(-weight), scalar(diagonal), rhs, 1e-6)
+        product = diagonal[:, None] * solution
         np.subtract.at(product, i, weight[:, None] * solution[j])
         np.subtract.at(product, j, weight[:, None] * solution[i])
         assert np.linalg.norm(product - rhs) < 2e-6 * np.linalg.norm(rhs)
@@ -117,27 +131,38 @@ def test_blocks_are_solved_whatever_their_size_in_single_precision(monkeypatch, 
     surface = Surface(*shapes.bump(5))
     weight, diagonal, matrix = laplacian(surface, 3)
     rhs = np.random.default_rng(5).normal(size=(len(matrix), 2))
-    beside = -size * weight * np.eye(2)[:, :, None]
-    blocks = size * diagonal * np.eye(2)[:, :, None]
-    solution = System(surface.order, surface.edges).solve_blocks(beside, blocks, rhs, 1e-6)
+    system = System(surface.order, surface.edges)
+    solution = solved(system, scalar(-size * weight), scalar(size * diagonal), rhs, 1e-6)
     assert np.linalg.norm(size * matrix @ solution - rhs) <= 1e-6 * np.linalg.norm(rhs)
+
+
+def fill(surface, order=None):
+    """Nonzeros of the factors in that order, or in SuperLU's own for any matrix."""
+    i, j = surface.edges.T
+    n = len(surface.vertices)
+    laplacian = coo_array((-np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsc()
+    laplacian.setdiag(1.1 - laplacian.sum(axis=0))
+    if order is not None:
+        laplacian = laplacian[order][:, order].tocsc()
+    ordering = "COLAMD" if order is None else "NATURAL"
+    return splu(laplacian, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True}).nnz
 
 
 def test_the_order_is_a_permutation_with_less_fill_than_the_generic_one():
     vertices, triangles = shapes.random_disk(3, inner=6000, outer=200)
     surface = Surface(vertices, triangles)
     order = nested_dissection(surface.vertices, surface.edges)
-    n = len(order)
-    assert (np.sort(order) == np.arange(n)).all()
-    i, j = surface.edges.T
-    laplacian = coo_array((-np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsc()
-    laplacian.setdiag(1.1 - laplacian.sum(axis=0))
+    assert (np.sort(order) == np.arange(len(order))).all()
+    assert fill(surface, order) < 0.8 * fill(surface)
 
-    def fill(matrix, ordering):
-        options = {"SymmetricMode": True}
-        return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options=options).nnz
 
-    assert fill(laplacian[order][:, order].tocsc(), "NATURAL") < 0.8 * fill(laplacian, "COLAMD")
+def test_more_levels_than_short_integers_number_make_no_worse_order(monkeypatch):
+    surface = Surface(*shapes.grid(200, 200))
+    usual = fill(surface, nested_dissection(surface.vertices, surface.edges))
+    monkeypatch.setattr(solver, "_LEAF", 1)
+    order = nested_dissection(surface.vertices, surface.edges)
+    assert (np.sort(order) == np.arange(len(order))).all()
+    assert fill(surface, order) < 1.02 * usual
 
 
 def test_orders_of_tiny_and_edgeless_graphs():
