@@ -6,7 +6,7 @@ import numpy as np
 from .errors import UVError
 from .pieces import starts_of
 from .solver import Dirichlet
-from .triangles import by_parts, corners_of, normals
+from .triangles import corners_of, normals, sums_by_parts
 from .weights import cotangent, mean_value, uniform
 
 _WEIGHTS = {"UNIFORM": uniform, "HARMONIC": cotangent, "MEAN_VALUE": mean_value}
@@ -57,7 +57,7 @@ def project(surface):
         second = [share * (one * other).sum(axis=0) / 12 for one, other in pairs]
         return np.array([*normal, share, *(share * along[3] / 3 for along in (x, y, z)), *second])
 
-    total = np.add.reduceat(by_parts(moments, surface.triangles.T), surface.triangle_starts, axis=1)
+    total = sums_by_parts(moments, surface.triangle_starts, surface.triangles.T)
     normal, middle, second = total[:3], total[4:7] / total[3], total[7:] / total[3]
     xx, xy, xz, yy, yz, zz = second - middle[[0, 0, 0, 1, 1, 2]] * middle[[0, 1, 2, 1, 2, 2]]
     axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).T)[1]

@@ -31,6 +31,18 @@ def by_parts(function, *fields):
     return tuple(results) if several else results[0]
 
 
+def sums_by_parts(function, starts, *fields):
+    """The sums (r, p) of the field `function(*fields)` (r, m) over the triangles from each of the `starts` (p,)."""
+    sums = 0
+    for start in range(0, fields[0].shape[-1], _AT_ONCE):
+        part = slice(start, start + _AT_ONCE)
+        found = function(*(field[..., part] for field in fields))
+        pieces = slice(np.searchsorted(starts, start, side="right") - 1, np.searchsorted(starts, part.stop))
+        in_part = np.add.reduceat(found, np.maximum(starts[pieces] - start, 0), axis=1)
+        sums = sums + np.pad(in_part, ((0, 0), (pieces.start, len(starts) - pieces.stop)))
+    return sums
+
+
 def corners_of(points, triangles):
     """The corners (m, 3, d) of `triangles` (m, 3) with these points (n, d).
 
