@@ -214,8 +214,8 @@ def _newton_system(domain, energy, jacobian):
     for total, values in zip(gradient.T, by_corner, strict=True):
         total[free] = np.bincount(energy.corners.ravel(), values.ravel(), n)[free]
 
-    backward = energy.corners > np.roll(energy.corners, -1, axis=0)
-    np.negative(anti, out=anti, where=backward)  # transposed: as seen from the smaller vertex
+    for c, block in enumerate(anti):  # transposed where seen from the larger vertex
+        np.negative(block, out=block, where=energy.corners[c] > energy.corners[(c + 1) % 3])
     beside = [np.bincount(energy.edges, part.ravel(), k) for part in (mean, difference, symmetric, anti)]
     one, other = surface.edges.T
     # Moving all vertices together changes nothing.

@@ -135,7 +135,8 @@ class _Factors:
     def solve(self, rhs):
         """To the factors' precision."""
         with np.errstate(over="ignore"):
-            return self._factors.solve(rhs.astype(self._kind, copy=False)).astype(np.float64, copy=False)
+            solution = self._factors.solve(rhs.astype(self._kind, order="F", copy=False))  # as SuperLU has it
+        return solution.astype(np.float64, order="C", copy=False)
 
     def solve_exactly(self, rhs):
         """As exactly as positions need it, by corrections (Wilkinson's iterative refinement) in single precision."""
