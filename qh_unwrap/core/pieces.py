@@ -25,8 +25,8 @@ def first_and_last(items, place, count):
 
 def components(count, one, other):
     """How many parts things fall into that are linked in pairs, and that of each, (count,)."""
-    links = coo_array((np.ones(len(one), bool), (one, other)), shape=(count, count))
-    return connected_components(links, directed=False)
+    one, other = one.astype(np.int32), other.astype(np.int32)  # as SciPy has them, and the links as numbers
+    return connected_components(coo_array((np.ones(len(one)), (one, other)), shape=(count, count)), directed=False)
 
 
 def joined(points, triangles):

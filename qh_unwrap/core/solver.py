@@ -66,9 +66,11 @@ class System:
         for start in range(0, len(self._entry), _AT_ONCE):
             entry = self._entry[start : start + _AT_ONCE]
             blocks = self._blocks[start : start + _AT_ONCE]
-            m, d, s, a = (part[np.where(entry < k, entry, entry - k)] for part in parts)
+            ahead = entry < k
+            place = np.where(ahead, entry, entry - k)
+            m, d, s, a = (part[place] for part in parts)
             # The pattern is by columns, and what stands there is taken for rows: transpose.
-            a = np.where(entry < k, -a, a)
+            a = np.where(ahead, -a, a)
             blocks[:, 0, 0], blocks[:, 1, 1] = m + d, m - d
             blocks[:, 0, 1], blocks[:, 1, 0] = s - a, s + a
         return bsr_array((self._blocks, self._indices, self._indptr), shape=(2 * n, 2 * n))

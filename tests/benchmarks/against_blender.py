@@ -304,12 +304,12 @@ def converged(mesh):
 
 
 def in_turns(mesh, methods, seconds, most=9):
-    """For each method its runs, (seconds, UVs): in turns, as many as take about these seconds, at least one."""
+    """For each method its runs, (seconds, UVs), in turns: as many as take about so long, three if one takes less."""
     runs = {method: [] for method in methods}
     for _ in range(most):
         for method, done in runs.items():
-            spent = sum(each for each, _ in done)
-            if not done or spent + done[-1][0] < seconds:
+            longest = max((each for each, _ in done), default=0)
+            if not done or (longest < seconds and (len(done) < 3 or (len(done) + 1) * longest < seconds)):
                 done.append(unwrapped(mesh, method))
     return runs
 
