@@ -6,13 +6,14 @@ from scipy.sparse import bsr_array, coo_array, csc_array
 from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mckee
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
+from .triangles import parts
+
 _STEPS = 100  # of conjugate gradients
 _LARGE = 1000  # unknowns, for which an old factorization is tried first, and new ones are in single precision
 _PATIENCE = 12  # steps with an earlier factorization
 _HUGE = 30_000  # unknowns, for which it pays to solve in single precision and to correct the solutions,
 _CORRECTIONS = 6  # at most so many times,
 _EXACT = 1e-6  # until the next correction would be by this part of them
-_AT_ONCE = 8192  # blocks: what is at work stays in the processor's cache
 _LEAF = 16
 _FEW = 300  # vertices whose order hardly matters
 
@@ -60,15 +61,14 @@ class System:
         which are symmetric.  Holds until the next one is made.
         """
         n, k = len(self._order), len(beside[0])
-        parts = [*map(np.concatenate, zip(beside, own, strict=False)), np.pad(beside[3], (0, len(own[0])))]
+        rows = [np.concatenate(both) for both in zip(beside, (*own, np.zeros(len(own[0]))), strict=True)]
         if self._blocks is None:
             self._blocks = np.empty((len(self._entry), 2, 2))
-        for start in range(0, len(self._entry), _AT_ONCE):
-            entry = self._entry[start : start + _AT_ONCE]
-            blocks = self._blocks[start : start + _AT_ONCE]
+        for part in parts(len(self._entry)):
+            entry, blocks = self._entry[part], self._blocks[part]
             ahead = entry < k
             place = np.where(ahead, entry, entry - k)
-            m, d, s, a = (part[place] for part in parts)
+            m, d, s, a = (row[place] for row in rows)
             # The pattern is by columns, and what stands there is taken for rows: transpose.
             a = np.where(ahead, -a, a)
             blocks[:, 0, 0], blocks[:, 1, 1] = m + d, m - d
@@ -226,7 +226,7 @@ def nested_dissection(points, edges):
     if len(edges) and n <= _FEW:
         return banded(n, edges)
     levels = max(0, int(np.ceil(np.log2(max(n, 1) / _LEAF))))
-    piece = np.zeros(n, np.int16)  # -1 once in a separator
+    piece = np.zeros(n, np.int16)  # -1 once in a separator; short numbers are sorted faster
     key = np.zeros(n, dtype=np.int64)  # one base-3 digit a level: first half 0, second half 1, separator 2
     orders = [np.argsort(points[:, axis], kind="stable") for axis in range(axes)]
     i, j = edges.T.astype(np.intp, order="C")
@@ -240,7 +240,7 @@ def nested_dissection(points, edges):
         key += np.where(inside, half, 0)
         key[separator] += 2 - half[separator]
         if level == 15:
-            piece = piece.astype(np.int32)  # shorter ones are sorted faster
+            piece = piece.astype(np.int32)  # no longer short enough
         piece = np.where(inside, 2 * piece + half, piece.dtype.type(-1))
         piece[separator] = -1
         inside = piece >= 0

@@ -7,11 +7,16 @@ coordinate, and fields, which have the triangles in the last axis, are worked on
 
 import numpy as np
 
-_AT_ONCE = 8192  # triangles: what is at work stays in the processor's cache
+_AT_ONCE = 8192  # triangles, or entries of a matrix: what is at work stays in the processor's cache
 # A triangle lower than this part of its longest edge has no area, for all that single precision can tell.
 _FLATTEST = 1e-6
 # It is laid out with this part as its height: enough to stay valid in a map, too little to bend it.
 _THICKENED = 1e-2
+
+
+def parts(count):
+    """Slices of so many triangles, one after the other."""
+    return [slice(start, min(start + _AT_ONCE, count)) for start in range(0, count, _AT_ONCE)]
 
 
 def by_parts(function, *fields):
@@ -20,8 +25,7 @@ def by_parts(function, *fields):
     if count <= _AT_ONCE:
         return function(*fields)
     results = None
-    for start in range(0, count, _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
+    for part in parts(count):
         found = function(*(field[..., part] for field in fields))
         several = isinstance(found, tuple)
         if results is None:
@@ -34,11 +38,10 @@ def by_parts(function, *fields):
 def sums_by_parts(function, starts, *fields):
     """The sums (r, p) of the field `function(*fields)` (r, m) over the triangles from each of the `starts` (p,)."""
     sums = 0
-    for start in range(0, fields[0].shape[-1], _AT_ONCE):
-        part = slice(start, start + _AT_ONCE)
+    for part in parts(fields[0].shape[-1]):
         found = function(*(field[..., part] for field in fields))
-        pieces = slice(np.searchsorted(starts, start, side="right") - 1, np.searchsorted(starts, part.stop))
-        in_part = np.add.reduceat(found, np.maximum(starts[pieces] - start, 0), axis=1)
+        pieces = slice(np.searchsorted(starts, part.start, side="right") - 1, np.searchsorted(starts, part.stop))
+        in_part = np.add.reduceat(found, np.maximum(starts[pieces] - part.start, 0), axis=1)
         sums = sums + np.pad(in_part, ((0, 0), (pieces.start, len(starts) - pieces.stop)))
     return sums
 

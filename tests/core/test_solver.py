@@ -5,7 +5,7 @@ from hypothesis import given
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from qh_unwrap.core import Surface, solver
+from qh_unwrap.core import Surface, solver, triangles
 from qh_unwrap.core.solver import Dirichlet, System, nested_dissection
 from qh_unwrap.core.weights import cotangent, mean_value
 
@@ -56,7 +56,7 @@ def scalar(values):
 
 @pytest.mark.parametrize("at_once", [10, 8192])
 def test_systems_of_blocks_are_solved_roughly(monkeypatch, at_once):
-    monkeypatch.setattr(solver, "_AT_ONCE", at_once)
+    monkeypatch.setattr(triangles, "_AT_ONCE", at_once)
     surface = Surface(*shapes.bump(1))
     n = len(surface.vertices)
     rng = np.random.default_rng(1)
