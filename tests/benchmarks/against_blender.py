@@ -21,14 +21,13 @@ import numpy as np
 import scipy
 
 from qh_unwrap.addon.delaunay import triangulate
-from qh_unwrap.core import Settings, Surface, descent, unwrap
-from qh_unwrap.core.distortion import measure
-from qh_unwrap.core.validity import is_injective
+from qh_unwrap.core import Settings, descent, unwrap
 
 from .common import Verdicts, find_mesh, load_mesh, meshes_in, table
 from .drawing import BLUE, GREEN, GREY, RED, plain_ticks, plt, save
 from .generated import body, hills, hundred, islands
-from .in_blender import ANGLE_BASED, CONFORMAL, NATIVE, OURS, STRETCH_10, STRETCH_50, extension, unwrapped
+from .in_blender import ANGLE_BASED, CONFORMAL, NATIVE, OURS, STRETCH_10, STRETCH_50, extension, in_turns, unwrapped
+from .measuring import judged
 from .one_unwrap import alone
 
 SCANS = ("venus.obj", "camel_b.obj", "camelhead.off", "mannequin-devil.off", "cowhead.obj", "face_bff.obj")
@@ -74,10 +73,9 @@ def quality(arguments, verdicts):
     print("Symmetric Dirichlet energy of ours, Minimum Stretch 10 and 50, and ours converged; time of ours\n")
     found = []
     for name, mesh in meshes.items():
-        surface = Surface(*mesh)
         row = {"mesh": name, "triangles": len(mesh[1])}
         for method in (OURS, STRETCH_10, STRETCH_50):
-            row[method] = judged(surface, *unwrapped(mesh, method))
+            row[method] = judged(mesh, *unwrapped(mesh, method))
         row["converged"] = converged(mesh)
         found.append(row)
         energies = (row[method]["energy"] for method in (OURS, STRETCH_10, STRETCH_50))
@@ -193,15 +191,15 @@ def islands_of_20(arguments, verdicts):
     """Thousands of pieces in one mesh."""
     vertices, triangles, piece = islands(arguments.pieces)
     ends = np.flatnonzero(np.diff(piece)) + 1
-    surfaces = []
+    parts = []
     for part in np.split(triangles, ends):
         corner, corners = np.unique(part, return_inverse=True)
-        surfaces.append((corner, Surface(vertices[corner], corners.reshape(-1, 3))))
-    found = {"islands": len(surfaces), "triangles": len(triangles)}
+        parts.append((corner, (vertices[corner], corners.reshape(-1, 3))))
+    found = {"islands": len(parts), "triangles": len(triangles)}
     rows = []
     for method, runs in in_turns((vertices, triangles), (OURS, STRETCH_10), arguments.seconds).items():
         seconds = median(seconds for seconds, _ in runs)
-        maps = [judged(surface, seconds, runs[-1][1][corner]) for corner, surface in surfaces]
+        maps = [judged(part, seconds, runs[-1][1][corner]) for corner, part in parts]
         found[method] = {
             "seconds": seconds,
             "energy": float(np.mean([one["energy"] for one in maps])),
@@ -212,12 +210,12 @@ def islands_of_20(arguments, verdicts):
     table(("method", "seconds", "mean sym. Dirichlet", "flips", "certified"), rows)
     ours, native = found[OURS], found[STRETCH_10]
     verdicts.claim(
-        f"{len(surfaces)} islands of 20 triangles: all certified, and no more distortion than {STRETCH_10}",
-        ours["certified"] == len(surfaces) and ours["energy"] <= native["energy"],
+        f"{len(parts)} islands of 20 triangles: all certified, and no more distortion than {STRETCH_10}",
+        ours["certified"] == len(parts) and ours["energy"] <= native["energy"],
         f"energies {ours['energy']:.6f} and {native['energy']:.6f}",
     )
     verdicts.claim(
-        f"{len(surfaces)} islands of 20 triangles: no slower than {STRETCH_10}",
+        f"{len(parts)} islands of 20 triangles: no slower than {STRETCH_10}",
         ours["seconds"] <= native["seconds"],
         f"{ours['seconds']:.2f} s, {native['seconds']:.2f} s",
     )
@@ -233,8 +231,7 @@ def slider(arguments, verdicts):
         meshes |= {name: made[name] for name in list(made)[: 3 * (len(SLID) - len(meshes)) : 3]}
     found, rows = [], []
     for name, mesh in meshes.items():
-        surface = Surface(*mesh)
-        maps = [judged(surface, *unwrapped(mesh, balance=balance)) for balance in BALANCES]
+        maps = [judged(mesh, *unwrapped(mesh, balance=balance)) for balance in BALANCES]
         found.append({"mesh": name, "triangles": len(mesh[1]), "balances": BALANCES, "maps": maps})
         for measured in ("angle", "area"):
             rows.append((name, measured, *(one[measured] for one in maps)))
@@ -273,24 +270,6 @@ def sizes_up_to(largest, sizes):
     return [size for size in sizes if size <= largest]
 
 
-def judged(surface, seconds, uv):
-    """Time and measures of a map; these are infinite if there is none."""
-    if uv is None:
-        measures = dict.fromkeys(("energy", "l2_stretch", "angle", "area"), np.inf)
-        return {"seconds": seconds, **measures, "flips": 0, "collapsed": 0, "certified": False}
-    after = measure(surface, uv)
-    return {
-        "seconds": seconds,
-        "energy": after.symmetric_dirichlet,
-        "l2_stretch": after.l2_stretch,
-        "angle": after.angle,
-        "area": after.area,
-        "flips": after.flips,
-        "collapsed": after.collapsed,
-        "certified": is_injective(uv, surface.triangles, surface.loops),
-    }
-
-
 def converged(mesh):
     """The energy at the end of our own descent: started again until it no longer falls by 1e-4."""
     energy, uv = np.inf, None
@@ -303,22 +282,11 @@ def converged(mesh):
                 return min(before, energy)
 
 
-def in_turns(mesh, methods, seconds, most=9):
-    """For each method its runs, (seconds, UVs), in turns: as many as take about so long, three if one takes less."""
-    runs = {method: [] for method in methods}
-    for _ in range(most):
-        for method, done in runs.items():
-            longest = max((each for each, _ in done), default=0)
-            if not done or (longest < seconds and (len(done) < 3 or (len(done) + 1) * longest < seconds)):
-                done.append(unwrapped(mesh, method))
-    return runs
-
-
 def compared(name, mesh, methods, seconds):
     """Print and return time, the median of several runs and the best, and measures of each method on a mesh."""
-    surface, found, rows = Surface(*mesh), {}, []
+    found, rows = {}, []
     for method, runs in in_turns(mesh, methods, seconds).items():
-        found[method] = judged(surface, median(seconds for seconds, _ in runs), runs[-1][1])
+        found[method] = judged(mesh, median(seconds for seconds, _ in runs), runs[-1][1])
         found[method] |= {"best": min(seconds for seconds, _ in runs), "runs": len(runs)}
     for method, one in found.items():
         times = one["seconds"] / found[OURS]["seconds"]

@@ -11,6 +11,7 @@ import os
 import sys
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +21,42 @@ MESHES = "QH_MESHES"
 EXACT = {"boundary": "CIRCLE", "tolerance": 0, "refine": 0, "repair": False}  # unless a benchmark says otherwise
 
 
+class Polygons(NamedTuple):
+    """A mesh of polygons, and its UVs where it has any."""
+
+    vertices: np.ndarray  # (n, 3)
+    corners: np.ndarray  # (c,) vertex of each corner, face after face
+    sizes: np.ndarray  # (f,) corners of each face
+    uv: np.ndarray | None = None  # (c, 2)
+
+    @classmethod
+    def alike(cls, vertices, faces):
+        """The mesh whose faces (f, k) all have k corners."""
+        return cls(vertices, faces.ravel(), np.full(len(faces), faces.shape[1]))
+
+    @property
+    def triangle_count(self):
+        return int(self.sizes.sum() - 2 * len(self.sizes))
+
+
 def load_mesh(path):
     """Vertices (n, 3) and triangles (m, 3) of an .off or .obj file; larger faces become fans of triangles."""
+    points, _, faces = _parsed(path)
+    triangles = [(face[0][0], face[k][0], face[k + 1][0]) for face in faces for k in range(1, len(face) - 1)]
+    return points, np.array(triangles, dtype=np.int64)
+
+
+def load_polygons(path):
+    """The `Polygons` of such a file, with UVs if every corner has them."""
+    points, uv, faces = _parsed(path)
+    corners = [corner for face in faces for corner in face]
+    uv = uv[[corner[1] for corner in corners]] if all(len(corner) == 2 for corner in corners) else None
+    corners = np.array([corner[0] for corner in corners], dtype=np.int64)
+    return Polygons(points, corners, np.array([len(face) for face in faces]), uv)
+
+
+def _parsed(path):
+    """Points (n, 3), UVs (k, 2) and faces, lists of corners: each a point's number, and its UV's if it has one."""
     path = Path(path)
     lines = [line.split("#")[0].split() for line in path.read_text().splitlines()]
     lines = [line for line in lines if line]
@@ -30,15 +65,21 @@ def load_mesh(path):
             raise ValueError(f"{path.name} does not begin with OFF")
         vertex_count, face_count = int(lines[1][0]), int(lines[1][1])
         points, rest = lines[2 : 2 + vertex_count], lines[2 + vertex_count :]
-        faces = [[int(i) for i in line[1 : 1 + int(line[0])]] for line in rest[:face_count]]
+        uv, faces = [], [[(int(i),) for i in line[1 : 1 + int(line[0])]] for line in rest[:face_count]]
     elif path.suffix == ".obj":
-        points = [line[1:4] for line in lines if line[0] == "v"]
-        faces = [[int(corner.split("/")[0]) for corner in line[1:]] for line in lines if line[0] == "f"]
-        faces = [[i - 1 if i > 0 else i + len(points) for i in face] for face in faces]
+        points, uv = ([line[1:] for line in lines if line[0] == kind] for kind in ("v", "vt"))
+        counts = len(points), len(uv)
+        faces = [[_obj_corner(text, counts) for text in line[1:]] for line in lines if line[0] == "f"]
     else:
         raise ValueError(f"{path.name} is neither .off nor .obj")
-    triangles = [(face[0], face[k], face[k + 1]) for face in faces for k in range(1, len(face) - 1)]
-    return np.array([point[:3] for point in points], dtype=float), np.array(triangles, dtype=np.int64)
+    uv = np.array([pair[:2] for pair in uv], dtype=float).reshape(-1, 2)
+    return np.array([point[:3] for point in points], dtype=float), uv, faces
+
+
+def _obj_corner(text, counts):
+    """The numbers of a corner's point and UV, the latter if it has one; counted from 0, in the file from 1 or back."""
+    numbers = [int(number) for number in text.split("/")[:2] if number]
+    return tuple(i - 1 if i > 0 else i + count for i, count in zip(numbers, counts, strict=False))
 
 
 def find_mesh(name):
@@ -47,10 +88,14 @@ def find_mesh(name):
     return next(Path(folder).rglob(name), None) if folder else None
 
 
+def paths_in(folder):
+    """The paths of the mesh files of a folder within QH_MESHES, none if there is no such folder."""
+    return sorted(Path(os.environ.get(MESHES, os.devnull), folder).glob("*.o[bf][jf]"))
+
+
 def meshes_in(folder):
     """The meshes of a folder within QH_MESHES by name, none if there is no such folder."""
-    paths = sorted(Path(os.environ.get(MESHES, os.devnull), folder).glob("*.o[bf][jf]"))
-    return {path.stem: load_mesh(path) for path in paths}
+    return {path.stem: load_mesh(path) for path in paths_in(folder)}
 
 
 def given_meshes(*names):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Unwrapping a mesh in Blender as an artist does, by our operator and by Blender's own; needs bpy.
 
-The mesh is in Edit Mode with all of its faces selected and without UVs.  Timed is the call of the operator, with its
-reading, packing and writing, and ours includes its check for flips.
+The mesh is in Edit Mode with all of its faces selected and without UVs; those that it comes with say where its seams
+are.  Timed is the call of the operator, with its reading, packing and writing, and ours includes its check for flips.
 """
 
 import os
@@ -14,6 +14,8 @@ import bpy
 import numpy as np
 
 import qh_unwrap
+
+from .common import Polygons
 
 OURS = "QH Unwrap"
 ANGLE_BASED, CONFORMAL = "Angle Based", "Conformal"
@@ -37,11 +39,13 @@ def extension():
 
 
 def unwrapped(mesh, method=OURS, around=nullcontext(), **settings):  # noqa: B008 (it keeps no state)
-    """Seconds that a method, ours with these settings, takes on the mesh, and the UVs (n, 2) of its vertices as stored.
+    """Seconds that a method, ours with these settings, takes on the mesh, and the UVs as stored.
 
+    A mesh of vertices (n, 3) and triangles (m, 3) has the UVs (n, 2) of its vertices, `Polygons` those of its corners.
     The UVs are None if the operator fails.  The context manager `around` is entered for the call alone.
     """
-    data = _in_edit_mode(*mesh)
+    polygons = mesh if isinstance(mesh, Polygons) else Polygons.alike(*mesh)
+    data = _in_edit_mode(polygons)
     begun = time.perf_counter()
     try:
         with _silence(), around:
@@ -56,9 +60,33 @@ def unwrapped(mesh, method=OURS, around=nullcontext(), **settings):  # noqa: B00
     bpy.ops.object.mode_set(mode='OBJECT')
     corners = np.empty(2 * len(data.loops), np.float32)
     data.uv_layers.active.uv.foreach_get("vector", corners)
-    uv = np.zeros((len(mesh[0]), 2))
-    uv[mesh[1].ravel()] = corners.reshape(-1, 2)
+    corners = corners.reshape(-1, 2).astype(float)
+    if polygons is mesh:
+        return seconds, corners
+    uv = np.zeros((len(polygons.vertices), 2))
+    uv[polygons.corners] = corners
     return seconds, uv
+
+
+def in_turns(mesh, methods, seconds, most=9):
+    """For each method its runs, (seconds, UVs), in turns: as many as take about so long, three if one takes less."""
+    runs = {method: [] for method in methods}
+    for _ in range(most):
+        for method, done in runs.items():
+            longest = max((each for each, _ in done), default=0)
+            if not done or (longest < seconds and (len(done) < 3 or (len(done) + 1) * longest < seconds)):
+                done.append(unwrapped(mesh, method))
+    return runs
+
+
+def loop_triangles(polygons):
+    """The corners (t, 3) of the triangles that Blender makes of the polygons."""
+    data = _as_data(polygons)
+    data.calc_loop_triangles()
+    triangles = np.empty(3 * len(data.loop_triangles), np.int32)
+    data.loop_triangles.foreach_get("loops", triangles)
+    bpy.data.meshes.remove(data)
+    return triangles.reshape(-1, 3)
 
 
 @contextmanager
@@ -75,20 +103,31 @@ def _silence():
         os.close(kept)
 
 
-def _in_edit_mode(vertices, triangles):
+def _in_edit_mode(polygons):
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    data = bpy.data.meshes.new("mesh")
-    data.vertices.add(len(vertices))
-    data.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
-    data.loops.add(triangles.size)
-    data.loops.foreach_set("vertex_index", triangles.astype(np.int32).ravel())
-    data.polygons.add(len(triangles))
-    data.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
-    data.update(calc_edges=True)
+    data = _as_data(polygons)
     obj = bpy.data.objects.new("mesh", data)
     bpy.context.collection.objects.link(obj)
     bpy.context.view_layer.objects.active = obj
     obj.select_set(True)
     bpy.ops.object.mode_set(mode='EDIT')
     bpy.ops.mesh.select_all(action='SELECT')
+    if polygons.uv is not None:
+        bpy.ops.uv.select_all(action='SELECT')
+        bpy.ops.uv.seams_from_islands()
+        bpy.ops.mesh.uv_texture_remove()
+    return data
+
+
+def _as_data(polygons):
+    data = bpy.data.meshes.new("mesh")
+    data.vertices.add(len(polygons.vertices))
+    data.vertices.foreach_set("co", polygons.vertices.astype(np.float32).ravel())
+    data.loops.add(len(polygons.corners))
+    data.loops.foreach_set("vertex_index", polygons.corners.astype(np.int32))
+    data.polygons.add(len(polygons.sizes))
+    data.polygons.foreach_set("loop_start", (np.cumsum(polygons.sizes) - polygons.sizes).astype(np.int32))
+    data.update(calc_edges=True)
+    if polygons.uv is not None:
+        data.uv_layers.new().uv.foreach_set("vector", polygons.uv.astype(np.float32).ravel())
     return data
