@@ -4,10 +4,11 @@
 Default settings, Edit Mode to Edit Mode; distortion is measured on the UVs that Blender stores.  Needs bpy; the meshes
 of QH_MESHES are added to the generated ones.  Figures are also written to the folder `--out` as JSON.
 
-    python -m tests.benchmarks.against_blender [--part quality|time|growth|islands|slider|scans|all] [--largest 30000]
+    python -m tests.benchmarks.against_blender [--part PART] [--largest 30000] [--seconds 3]
 
-Of the parts, `quality` takes some fifteen minutes and `time` half an hour, nearly all of it Minimum Stretch at 200 000
-triangles.
+The parts are `quality`, `time`, `growth`, `islands`, `slider` and `scans`, and those of `assets`: `charts`, `models`,
+`quads` and `assets`.  `quality` takes some fifteen minutes and `time` half an hour, nearly all of it Minimum Stretch at
+200 000 triangles.
 """
 
 import argparse
@@ -23,6 +24,7 @@ import scipy
 from qh_unwrap.addon.delaunay import triangulate
 from qh_unwrap.core import Settings, descent, unwrap
 
+from . import assets
 from .common import Verdicts, find_mesh, load_mesh, meshes_in, table
 from .drawing import BLUE, GREEN, GREY, RED, plain_ticks, plt, save
 from .generated import body, hills, hundred, islands
@@ -263,6 +265,7 @@ PARTS = {
     "islands": islands_of_20,
     "slider": slider,
     "scans": scans,
+    **assets.PARTS,
 }
 
 

@@ -46,7 +46,7 @@ def islands(count=5000):
     plane = plane.reshape(-1, 2)
     vertices = np.column_stack([plane, 0.3 * np.sin(5 * plane[:, 0]) * np.cos(6 * plane[:, 1])])
     quad_row, quad_column = (index.ravel() for index in np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"))
-    faces = _quads_halved(random, quad_row * (columns + 1) + quad_column, columns + 1)
+    faces = quads_halved(random, quad_row * (columns + 1) + quad_column, columns + 1)
     lengthwise = random.random((up, across)) < 0.5  # cut into two rows, else in the middle
     block_row, block_column = quad_row // 2, quad_column // 10
     second = np.where(lengthwise[block_row, block_column], quad_row % 2, quad_column % 10 // 5)
@@ -70,7 +70,7 @@ def terrain(random, size):
     """Landscapes rough at every scale."""
     columns = round(np.sqrt(size / 2 * random.uniform(0.5, 2)))
     vertices, faces = _grid(random, columns, max(4, round(size / 2 / columns)))
-    return _with_height(vertices, _waves(random, vertices[:, :2], 7, random.uniform(0.9, 1.4))), faces
+    return _with_height(vertices, waves(random, vertices[:, :2], 7, random.uniform(0.9, 1.4))), faces
 
 
 def curled_sheet(random, size):
@@ -79,7 +79,7 @@ def curled_sheet(random, size):
     rows = max(4, round(np.sqrt(size / 2 / long)))
     vertices, faces = _grid(random, round(size / 2 / rows), rows, width=long)
     angle = random.uniform(1, 3) * np.pi * vertices[:, 0] / long
-    radius = 0.3 * long * (1 + 0.12 * angle) + random.uniform(0.1, 0.6) * _waves(random, vertices[:, :2], 4, 1.2)
+    radius = 0.3 * long * (1 + 0.12 * angle) + random.uniform(0.1, 0.6) * waves(random, vertices[:, :2], 4, 1.2)
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), vertices[:, 1]]), faces
 
 
@@ -251,10 +251,10 @@ def _grid(random, columns, rows, width=1.0, jitter=0.25):
     vertices[:, 0] += np.where((x > 0) & (x < width), moved[:, 0], 0)
     vertices[:, 1] += np.where((y > 0) & (y < 1), moved[:, 1], 0)
     corner = np.add.outer(np.arange(rows) * (columns + 1), np.arange(columns)).ravel()
-    return vertices, _quads_halved(random, corner, columns + 1)
+    return vertices, quads_halved(random, corner, columns + 1)
 
 
-def _quads_halved(random, corner, row):
+def quads_halved(random, corner, row):
     """Two triangles for every quad of a grid, along either diagonal; `row` is how far the next row's vertices are."""
     a, b, c, d = corner, corner + 1, corner + row + 1, corner + row
     one = np.stack([np.column_stack([a, b, c]), np.column_stack([a, c, d])], axis=1)
@@ -313,7 +313,7 @@ def _height(plane, tops):
     return height
 
 
-def _waves(random, plane, octaves, smoothness):
+def waves(random, plane, octaves, smoothness):
     """Noise of about unit slope: in every octave waves in four directions, the shorter the lower."""
     height = np.zeros(len(plane))
     for octave in range(octaves):
