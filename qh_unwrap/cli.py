@@ -23,6 +23,23 @@ _INPUT = (
 )
 
 
+_command = None
+
+
+def register():
+    """Let `blender --command qh_unwrap` come here."""
+    global _command
+    import bpy
+
+    _command = bpy.utils.register_cli_command("qh_unwrap", main)
+
+
+def unregister():
+    import bpy
+
+    bpy.utils.unregister_cli_command(_command)
+
+
 class _UsageError(Exception):
     pass
 
@@ -83,6 +100,7 @@ def _argument(field):
 def _run(args):
     try:
         settings, options = (_made_from(args, kind) for kind in (Settings, MeshOptions))
+        settings.check_together()
     except UnwrapError as error:
         raise _UsageError(error) from None
     try:

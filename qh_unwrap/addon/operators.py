@@ -5,11 +5,11 @@ import bpy
 
 from ..core.errors import SettingsError
 from . import properties, selection
-from .outcome import sentences, summary
+from .outcome import latest, sentences, summary
 from .running import InSteps
 from .unwrapping import unwrap_targets
 
-last_outcomes = []  # of the latest run, for the panels
+last_outcomes = latest  # for the panels
 
 
 class QH_OT_unwrap(InSteps, properties.OperatorProperties, bpy.types.Operator):
@@ -43,13 +43,13 @@ class QH_OT_unwrap(InSteps, properties.OperatorProperties, bpy.types.Operator):
             return None
         try:
             settings, options = self.settings(), self.mesh_options()
+            settings.check_together()
         except SettingsError as error:
             self.report({'ERROR'}, str(error))
             return None
         return unwrap_targets(targets, settings, options, context)
 
     def finish(self, outcomes):
-        last_outcomes[:] = outcomes
         for sentence in sentences(outcomes):
             self.report({'INFO'}, sentence)
         failed = sum(bool(outcome.error) for outcome in outcomes)

@@ -14,7 +14,7 @@ class Outcome:
 
     obj: str
     number: int
-    faces: int
+    face_indices: np.ndarray  # (f,) of the mesh
     alone: bool = True  # the only one of its mesh
     area: float = 0.0
     before: Distortion | None = None
@@ -25,6 +25,11 @@ class Outcome:
     overlaps: tuple[str, ...] = ()  # what it lies on since it was unwrapped
     warnings: tuple[str, ...] = ()
     error: str = ""
+
+    @property
+    def faces(self):
+        """How many there are."""
+        return len(self.face_indices)
 
     @property
     def label(self):
@@ -71,6 +76,18 @@ class Outcome:
             overlaps=list(self.overlaps),
             warnings=self.messages(),
         )
+
+
+latest: list[Outcome] = []  # of the latest run
+
+
+def last_report():
+    """What became of every island of the latest run, in Blender or by the command line: a list of dictionaries.
+
+    Each has `object`, `island` (its number), `faces` (how many), `face_indices` and either `error` or `before`,
+    `after`, `iterations`, `converged`, `injective`, `overlaps` and `warnings`, as in the command line's JSON.
+    """
+    return [outcome.to_dict() | dict(face_indices=outcome.face_indices.tolist()) for outcome in latest]
 
 
 def sentences(outcomes):

@@ -4,9 +4,8 @@
 import bpy
 import numpy as np
 
-from ..core import UnwrapError
+from ..core import UnwrapError, placing
 from ..core.pieces import joined, starts_of
-from . import placing
 
 _NAME = "QH Unwrap"
 

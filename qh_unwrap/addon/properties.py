@@ -65,11 +65,11 @@ class OperatorProperties(SettingsProperties):
                 setattr(self, field.name, getattr(other, field.name))
 
 
-_FIRST = ('boundary', 'aspect', 'balance', 'iterations')
+_FIRST = ('boundary', 'aspect', 'balance', 'iterations', 'weights')
 _SECTIONS = {
     "Layout": ('placement', 'rotate', 'margin_method', 'margin'),
     "Mesh": ('fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data'),
-    "Advanced": ('initial', 'weights', 'refine', 'repair', 'tolerance', 'tensor_power'),
+    "Advanced": ('initial', 'refine', 'repair', 'tolerance', 'tensor_power'),
 }
 
 
@@ -96,9 +96,14 @@ def _draw_rows(layout, owner, names):
 
 def _applies(owner, name):
     placed = owner.boundary != 'KEEP'
+    iterates = owner.iterations > 0
+    refines = owner.weights == 'COTANGENT' and owner.refine > 0
     return {
         'refine': owner.weights == 'COTANGENT',
-        'repair': owner.weights == 'COTANGENT',
+        'repair': owner.weights == 'COTANGENT' and iterates,
+        'weights': iterates or owner.boundary != 'FREE',
+        'tensor_power': iterates and owner.weights != 'STRETCH',
+        'tolerance': iterates and not refines,
         'fill_holes': owner.boundary not in ('KEEP', 'FREE'),
         'placement': placed,
         'rotate': placed and owner.placement == 'PACK',

@@ -1,29 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Unwrapping the chosen faces of objects: read, split into islands, unwrap each, place, write."""
+"""Unwrapping the chosen faces of objects: read, split into islands, unwrap, place, write, judge what is stored."""
 
 import dataclasses
 import itertools
+from collections.abc import Generator, Sequence
 
+import bpy
 import numpy as np
 
-from ..core import UnwrapError, distortion, unwrap_steps, unwrap_together
+from ..core import Settings, Shape, UnwrapError, distortion, placing, unwrap_islands
+from ..core.certificate import are_injective, orientation
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import attached, find_islands
 from ..core.pieces import joined, numbers
 from ..core.stepping import mapped
-from ..core.validity import are_injective, orientation
-from . import memory, mesh_arrays, packing, placing
-from .delaunay import triangulate
-from .outcome import Outcome, count
-from .overlaps import overlap, overlapping
+from . import layout, mesh_arrays
+from .options import MeshOptions
+from .outcome import Outcome, count, latest
+from .selection import Target
 from .work import Work
 
-_FIXED = 300  # vertices that take as long as what an island takes whatever its size
-_LEFT = 0.9  # of an island after each iteration, by and large
-_TOGETHER = 0.5  # of the work is that on small islands, if there are any
 
-
-def unwrap_targets(targets, settings, options, context):
+def unwrap_targets(
+    targets: Sequence[Target], settings: Settings, options: MeshOptions, context: bpy.types.Context
+) -> Generator[float, None, list[Outcome]]:
     """Unwrap the targets' faces.  A generator: yields the share that is done, returns the outcomes.
 
     An island that fails is left as it was, and its outcome says why; nothing is written before all are done.
@@ -32,22 +32,23 @@ def unwrap_targets(targets, settings, options, context):
     for target in targets:
         yield 0.0
         works += _works(target, settings, options)
-    yield from _unwrap_all(works)
+    yield from _unwrap(works)
     yield 1.0
+    outcomes = [work.outcome for work in works]
     if not all(mesh_arrays.is_as_read(work.target.obj, work.mesh) for work in works):
-        for work in works:
-            work.outcome.error = "a mesh was changed meanwhile: unwrap again"
-        return [work.outcome for work in works]
-
-    _place([work for work in works if work.uv is not None], works, options, context)
-    placed = [work for work in works if work.uv is not None]
-    if placed:
-        if options.placement != 'UNIT':
-            _report_overlaps(placed, works)
-        with mesh_arrays.in_object_mode(context):
-            for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
-                _write(obj, list(group))
-    return [work.outcome for work in works]
+        for outcome in outcomes:
+            outcome.error = "a mesh was changed meanwhile: unwrap again"
+    else:
+        layout.place([work for work in works if work.uv is not None], works, options, context)
+        placed = [work for work in works if work.uv is not None]
+        if placed:
+            if options.placement != 'UNIT':
+                layout.report_overlaps(placed, works)
+            with mesh_arrays.in_object_mode(context):
+                for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
+                    _write(obj, list(group))
+    latest[:] = outcomes
+    return outcomes
 
 
 def _works(target, settings, options):
@@ -59,170 +60,66 @@ def _works(target, settings, options):
         hanging = attached(*topology, mesh.uv)
     islands = find_islands(*topology, mesh.corner_triangles)
     for number, island in enumerate(islands, start=1):
-        outcome = Outcome(obj.name, number, len(island.faces), alone=len(islands) == 1)
+        outcome = Outcome(obj.name, number, island.faces, alone=len(islands) == 1)
         yield Work(target, mesh, island, outcome, settings, hanging)
 
 
-def _unwrap_all(works):
-    """Unwrap the small ones together and the others one by one; yields the share that is done."""
-    share = 0.0
-    for share in _unwrap_together(works):
-        yield share
-    works = [work for work in works if work.uv is None]
-    sizes = np.array([_FIXED + len(work.island.vertices) for work in works])
-    left = (1 - share) / max(sizes.sum(), 1)
-    for done, size, work in zip(np.cumsum(sizes) - sizes, sizes, works, strict=True):
+def _unwrap(works):
+    """Unwrap the islands, all of the same settings at once; yields the share that is done."""
+    shapes: dict[Settings, list[tuple[Work, Shape]]] = {}
+    for work in works:
         try:
-            yield share + left * done
-            for iteration in _unwrap(work):
-                yield share + left * (done + size * (1 - _LEFT**iteration))
+            settings, shape = _shape(work)
+            shapes.setdefault(settings, []).append((work, shape))
         except UnwrapError as error:
             work.outcome.error = str(error)
-        except MemoryError:
-            work.outcome.error = "the memory ran out: mark seams to cut it into smaller islands"
+    done = 0
+    for settings, group in shapes.items():
+        steps = unwrap_islands([shape for _, shape in group], settings)
+        first, its = done / len(works), len(group) / len(works)
+        results = yield from mapped(lambda share, first=first, its=its: first + its * share, steps)
+        done += len(group)
+        for (work, _), result in zip(group, results, strict=True):
+            if isinstance(result, UnwrapError):
+                work.outcome.error = _explained(result, work)
+            else:
+                _keep(work, result)
 
 
-def _unwrap_together(works):
-    """Unwrap what is small and free, all at once; yields the share that is done then, if others are left."""
-    free_memory = memory.free()
-    works = [work for work in works if work.is_free and memory.suffices(len(work.vertices), free_memory)]
-    if not works:
-        return
-    old = [None if work.old_uv is None or work.is_cut else work.old_uv for work in works]
-    islands = [(work.vertices, work.triangles, uv) for work, uv in zip(works, old, strict=True)]
-    steps = unwrap_together(islands, works[0].settings)
-    try:
-        results = yield from mapped(lambda done: _TOGETHER * done / len(works), steps)
-    except MemoryError:  # there may be enough for one at a time
-        return
-    for work, result in zip(works, results, strict=True):
-        if result is not None:
-            _keep(work, result)
-
-
-def _unwrap(work):
-    memory.check(len(work.vertices), memory.free())
-    hanging = work.hanging if work.old_triangles is not None else np.zeros(len(work.vertices), dtype=bool)
-    try:
-        result = yield from _result(work, hanging)
-    except (BoundaryError, UVError) as error:
-        if not hanging.any():
-            raise
-        raise type(error)(f"{error} (faces that are not selected hang on it: or select all of its island)") from None
-    _keep(work, result)
-
-
-def _keep(work, result):
-    work.uv, work.loops = result.uv, result.loops
-    work.mirrored = result.report.mirrored
-    work.outcome.before, work.outcome.after = result.report.before, result.report.after
-    work.outcome.iterations = result.report.iterations
-    work.outcome.converged = result.report.converged
-    work.outcome.warnings += tuple(result.report.warnings)
-    if work.island.crowded_edges:
-        edges = count(work.island.crowded_edges, "edge")
-        work.outcome.warnings += (f"it ends at {edges} where more than two faces meet",)
-
-
-def _result(work, hanging):
+def _shape(work):
+    """The settings and the shape that the core gets for an island."""
     settings, uv, pinned = work.settings, work.old_uv, work.pinned
-    if hanging.any():
+    if work.is_attached:
         if settings.boundary == 'FREE':
-            pinned |= hanging
+            pinned = pinned | work.attached_vertices
         elif settings.boundary != 'KEEP':
             settings = dataclasses.replace(settings, boundary='KEEP')
             work.outcome.warnings += ("its outline is kept, since faces that are not selected hang on it",)
-    work.in_frame = settings.boundary == 'KEEP' or (settings.boundary == 'FREE' and pinned.any())
+    work.in_frame = settings.boundary == 'KEEP' or (settings.boundary == 'FREE' and bool(pinned.any()))
     if uv is not None and work.is_cut:
         if work.in_frame or settings.initial == 'CURRENT':
-            raise UVError("its UVs are cut where there is no seam: mark the cuts with UV > Seams from Islands")
+            text = "its UVs are cut where there is no seam: mark the cuts with UV > Seams from Islands"
+            raise UVError(text + (_HANGS if work.is_attached else ""))
         uv = None
-    steps = unwrap_steps(work.vertices, work.triangles, settings, uv=uv, pinned=pinned, triangulate=triangulate)
-    return (yield from mapped(lambda state: state.iteration, steps))
+    return settings, Shape(work.vertices, work.triangles, uv, pinned if pinned.any() else None)
 
 
-def _place(works, all_works, options, context):
-    works = [work for work in works if not work.in_frame]
-    for work in works:
-        old = work.old_triangles
-        work.mirrored = old is not None and placing.is_mirrored(old)
-        if work.mirrored:
-            work.uv = work.uv * (-1, 1)
-        if options.placement == 'UNIT':
-            work.uv = placing.in_unit_square(work.uv / work.aspect) * work.aspect
-        elif old is not None:
-            work.uv = placing.in_place(work.uv, work.triangles, old)
-    if options.placement == 'UNIT':
-        return
-    new = [work for work in works if work.old_triangles is None]
-    if new:
-        turned = placing.upright([(work.uv, work.vertices, work.triangles, work.mesh.up) for work in new])
-        for work, uv in zip(new, turned, strict=True):
-            work.uv = uv
-    if options.placement == 'PACK':
-        _pack(works, options, True, context)
-    elif new:
-        _pack(new, options, False, context)
-        tile = placing.free_tile(np.concatenate([np.empty((0, 2)), *_others(new, all_works)]))
-        for work in new:
-            if work.uv is not None:
-                work.uv = work.uv + (tile, 0) * work.aspect
+_HANGS = " (faces that are not selected hang on it: or select all of its island)"
 
 
-def _pack(works, options, nested, context):
-    works = sorted(works, key=lambda work: work.aspect[0])
-    groups = {
-        aspect: [(work.vertices, work.triangles, work.uv) for work in group]
-        for aspect, group in itertools.groupby(works, key=lambda work: work.aspect[0])
-    }
-    try:
-        packed = packing.pack(groups, options, nested, context) if works else []
-    except UnwrapError as error:
-        packed = [None] * len(works)
-        for work in works:
-            work.outcome.error = str(error)
-    for work, uv in zip(works, packed, strict=True):
-        work.uv = uv
+def _explained(error, work):
+    return f"{error}{_HANGS}" if work.is_attached and isinstance(error, BoundaryError | UVError) else str(error)
 
 
-def _others(works, all_works):
-    """The UVs (k, 2) of everything else in the works' meshes, where they mean anything."""
-    mine = {id(work) for work in works}
-    for work in all_works:
-        if id(work) not in mine and work.uv is not None:
-            yield work.uv / work.aspect
-        elif id(work) not in mine and work.old_triangles is not None:
-            yield work.old_uv / work.aspect
-    yield from (rest.reshape(-1, 2) for _, rest in _rests(all_works))
-
-
-def _rests(works):
-    """For each mesh, the faces that are not to be unwrapped, as triangles (t, 3, 2), where their UVs mean anything."""
-    for obj, group in itertools.groupby(works, key=lambda work: work.target.obj):
-        work = next(group)
-        mesh, faces = work.mesh, work.target.faces
-        if mesh.uv is not None and not faces.all():
-            corner_face = np.repeat(np.arange(len(faces)), np.diff(mesh.face_start, append=len(mesh.corner_vertex)))
-            rest = mesh.uv[mesh.corner_triangles[~faces[corner_face[mesh.corner_triangles[:, 0]]]]]
-            if placing.says_where(rest):
-                yield obj.name, rest
-
-
-def _report_overlaps(works, all_works):
-    """Name the islands that lie on others now and did not before."""
-    names = [work.outcome.label for work in works]
-    now = [(work.uv / work.aspect)[work.triangles] for work in works]
-    before = [work.old_triangles for work in works]
-    before = [old if old is None else old / work.aspect for old, work in zip(before, works, strict=True)]
-    for obj, rest in _rests(all_works):
-        names.append(f"faces of {obj} that were not unwrapped")
-        now.append(rest)
-        before.append(rest)
-    for i, j in overlapping(now):
-        if before[i] is None or before[j] is None or not overlap(before[i], before[j]):
-            works[i].outcome.overlaps += (names[j],)
-            if j < len(works):
-                works[j].outcome.overlaps += (names[i],)
+def _keep(work, result):
+    report, outcome = result.report, work.outcome
+    work.uv, work.loops, work.mirrored = result.uv, result.loops, report.mirrored
+    outcome.before, outcome.after = report.before, report.after
+    outcome.iterations, outcome.converged = report.iterations, report.converged
+    outcome.warnings += report.warnings
+    if work.island.crowded_edges:
+        edges = count(work.island.crowded_edges, "edge")
+        outcome.warnings += (f"it ends at {edges} where more than two faces meet",)
 
 
 def _write(obj, works):
@@ -241,15 +138,20 @@ def _write(obj, works):
 
 
 def _judge(works):
-    """Say what there is to say of the UVs that Blender stores, which are rounded where they lie now."""
+    """Say what there is to say of the UVs that Blender stores, rounded where they lie now, and of the triangles that it
+    draws.
+    """
     uvs = [work.stored_uv for work in works]
-    uv, triangles, first, triangle_starts = joined(uvs, [work.triangles for work in works])
+    uv, triangles, first, triangle_starts = joined(uvs, [work.drawn for work in works])
     piece = numbers(triangle_starts, len(triangles))
     sign = orientation(uv, triangles)
+    redrawn = [k for k, work in enumerate(works) if work.is_redrawn]
     changed = sign != np.concatenate([work.outcome.after.triangle_orientation for work in works])
-    for k in np.unique(piece[changed]):
+    for k in np.union1d(np.unique(piece[changed]), redrawn).astype(int):
         work = works[k]
         work.outcome.after = distortion(work.vertices, work.triangles, uvs[k] * work.aspect)
+        if work.is_redrawn:
+            _judge_drawn(work, sign[piece == k])
 
     loops = [loop + start for work, start in zip(works, first, strict=True) for loop in work.loops]
     solid = sign != 0  # those without area do not count, unless they should have some
@@ -258,3 +160,14 @@ def _judge(works):
     for work, certain in zip(works, certified.tolist(), strict=True):
         after = work.outcome.after
         work.outcome.injective = certain and not (after.flips or after.collapsed)
+
+
+def _judge_drawn(work, sign):
+    """Count the flips and collapses of an island's faces in the triangles that Blender draws."""
+    has_area = placing.areas_of_triangles(work.vertices, work.drawn) > 0
+    flips, collapsed = int((sign < 0).sum()), int(((sign == 0) & has_area).sum())
+    work.outcome.after = dataclasses.replace(work.outcome.after, flips=flips, collapsed=collapsed)
+    if flips or collapsed:
+        work.outcome.warnings += (
+            "Blender cuts some of its neighbouring faces along the same diagonal: triangulate them",
+        )

@@ -6,10 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core import Settings
+from ..core import Settings, placing
+from ..core.certificate import as_stored
 from ..core.islands import Island
-from ..core.validity import as_stored
-from . import mesh_arrays, placing
+from . import mesh_arrays
 from .outcome import Outcome
 from .selection import Target
 
@@ -45,9 +45,16 @@ class Work:
         corner_uv = self.mesh.uv[self.island.corners]
         if not np.isfinite(corner_uv).all() or not np.ptp(corner_uv, axis=0).any():
             return None
-        uv = np.empty((len(self.island.vertices), 2))
-        uv[self.island.corner_vertex] = corner_uv
-        return uv * self.aspect
+        return self.mesh.uv[self._source] * self.aspect
+
+    @cached_property
+    def _source(self):
+        """(n,) the mesh's corner that each vertex has its old UVs from, a pinned one if there is one."""
+        source = np.empty(len(self.island.vertices), dtype=np.intp)
+        source[self.island.corner_vertex] = self.island.corners
+        pinned = self.mesh.pinned[self.island.corners]
+        source[self.island.corner_vertex[pinned]] = self.island.corners[pinned]
+        return source
 
     @cached_property
     def old_triangles(self):
@@ -67,12 +74,12 @@ class Work:
 
     @property
     def corner_uv(self):
-        """The new UVs (c, 2) of its corners; where a vertex stayed, its corners stay to the last bit."""
-        uv = (self.uv / self.aspect)[self.island.corner_vertex]
+        """The new UVs (c, 2) of its corners, the same for all of a vertex; one that stayed stays to the last bit."""
+        uv = self.uv / self.aspect
         if self.in_frame:
-            stayed = (self.uv == self.old_uv).all(axis=1)[self.island.corner_vertex]
-            uv[stayed] = self.mesh.uv[self.island.corners[stayed]]
-        return uv
+            stayed = (self.uv == self.old_uv).all(axis=1)
+            uv[stayed] = self.mesh.uv[self._source[stayed]]
+        return uv[self.island.corner_vertex]
 
     @property
     def stored_uv(self):
@@ -88,16 +95,32 @@ class Work:
         return np.abs(gap).max() > 1e-5 * np.ptp(self.old_uv, axis=0).max()
 
     @property
-    def is_free(self):
-        """Whether nothing of it is held: no pin, and no face that is not unwrapped."""
-        return not (self.mesh.pinned[self.island.corners].any() or self.attached[self.island.corners].any())
+    def drawn(self):
+        """(t, 3) the triangles that Blender draws."""
+        return self._drawn if self.is_redrawn else self.island.triangles
+
+    @cached_property
+    def _drawn(self):
+        vertex = np.empty(len(self.mesh.corner_vertex), dtype=np.intp)
+        vertex[self.island.corners] = self.island.corner_vertex
+        return vertex[self.island.drawn_corners]
+
+    @cached_property
+    def is_redrawn(self):
+        """Whether Blender cuts some of its faces into other triangles than the core gets."""
+        return not np.array_equal(self.island.triangle_corners, self.island.drawn_corners)
+
+    @property
+    def is_attached(self):
+        """Whether its old UVs hang together with those of faces that are not unwrapped."""
+        return self.old_triangles is not None and bool(self.attached[self.island.corners].any())
 
     @property
     def pinned(self):
         return self._vertices_of(self.mesh.pinned)
 
     @property
-    def hanging(self):
+    def attached_vertices(self):
         return self._vertices_of(self.attached)
 
     def _vertices_of(self, corners):

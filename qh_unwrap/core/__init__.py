@@ -4,27 +4,31 @@
 `unwrap` makes UVs, `distortion` measures them, `Settings` says how; errors are `UnwrapError`.
 """
 
+from .chart import Surface
 from .distortion import Distortion, distortion
 from .errors import UnwrapError
-from .quasi_harmonic import State
 from .refinement import has_positive_weights, refine_obtuse
+from .report import Report, Result, Shape, State
+from .session import Unwrapper
 from .settings import Settings
-from .surface import Surface
-from .together import unwrap_together
-from .unwrapping import Report, Result, unwrap, unwrap_steps
+from .topology import Topology
+from .unwrapping import unwrap, unwrap_islands, unwrap_steps
 
 __all__ = [
     "Distortion",
     "Report",
     "Result",
     "Settings",
+    "Shape",
     "State",
     "Surface",
+    "Topology",
     "UnwrapError",
+    "Unwrapper",
     "distortion",
     "has_positive_weights",
     "refine_obtuse",
     "unwrap",
+    "unwrap_islands",
     "unwrap_steps",
-    "unwrap_together",
 ]

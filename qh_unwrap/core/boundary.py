@@ -6,13 +6,38 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from .errors import BoundaryError, PinError, UVError
+from .errors import BoundaryError, PinError, UnwrapError, UVError
 from .initial import project
-from .surface import edge_lengths
-from .validity import count_crossings, enclosed_area
+from .chart import Surface, edge_lengths
+from .certificate import count_crossings, enclosed_area
 
 _BOW = 0.02  # how far a side bulges, by its length, where it must not be straight
 _CORNER_CANDIDATES = 40
+
+
+def held_outlines(surface: Surface, settings, uv, has_uv, pinned):
+    """What `held_vertices` says of every piece of a surface, and the errors.
+
+    uv      (n, 2), of the pieces that have some, (p,) bool in `has_uv`
+    pinned  (n, 2) bool, for U and V
+
+    Returns (n, 2) bool, (n, 2), for each piece a tuple of warnings, and a dictionary from pieces to errors.
+    """
+    held, values = np.zeros(len(uv), bool), np.zeros((len(uv), 2))
+    warnings, faults = [()] * surface.piece_count, {}
+    ends = np.append(surface.vertex_starts, len(uv))
+    some = pinned.any(axis=1)
+    for k in range(surface.piece_count):
+        its = slice(ends[k], ends[k + 1])
+        pins = None if settings.boundary == "KEEP" else some[its]
+        try:
+            held[its], values[its], warnings[k] = held_vertices(
+                surface.one(k), settings, uv[its] if has_uv[k] else None, pins
+            )
+        except UnwrapError as error:
+            faults[k] = error
+    held = np.column_stack([held, held])
+    return (held | pinned if settings.boundary == "KEEP" else held), values, warnings, faults
 
 
 def held_vertices(surface, settings, uv=None, pinned=None):
@@ -28,6 +53,8 @@ def held_vertices(surface, settings, uv=None, pinned=None):
         if uv is None:
             raise UVError("a kept boundary needs UVs, and there are none: choose another boundary")
         return _kept(surface, uv, pinned), uv, warnings
+    if not edge_lengths(surface.vertices[loop]).any():
+        raise BoundaryError("its outline has no length: merge its vertices by distance, or mark seams elsewhere")
     if settings.boundary == "CIRCLE":
         places = _circle(surface.vertices[loop])
     elif settings.boundary == "RECTANGLE":
@@ -102,7 +129,7 @@ def _chosen_corners(surface, aspect):
     """Four places in the outer loop that turn sharply and cut it into sides that suit the rectangle."""
     loop = surface.loops[0]
     at = _fractions(surface.vertices[loop])
-    turn = np.pi - surface.angle_sums[loop]
+    turn = np.pi - surface.angle_sums(len(surface.vertices))[loop]
     # What the outline turns within 1.5 % of its length on either side, the vertex itself counting double
     total = np.concatenate([[0.0], np.cumsum(np.tile(turn, 3))])
     around = np.concatenate([at - 1, at, at + 1])

@@ -8,7 +8,7 @@ checked without rounding: it is the whole convex hull, covered once.
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
-from .validity import turn
+from .certificate import turn
 
 _JOGGLE = 1e-11  # of the size: for many points on one circle Qhull takes half as long again
 _ROUNDING = 1e-15  # of the terms of a turn (Shewchuk 1997, with a margin)

@@ -6,10 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .errors import UVError
-from .surface import Surface
+from .chart import Surface
 from .tensor import squared_stretches
 from .triangles import by_parts
-from .validity import orientation
+from .certificate import orientation
+
+
+def _per_triangle():
+    return field(repr=False, metadata={"per_triangle": True})
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +32,10 @@ class Distortion:
     """Triangles that are turned against their winding in 32-bit floats."""
     collapsed: int
     """Triangles without area in 32-bit floats, those without area on the surface not counted."""
-    triangle_stretch: np.ndarray = field(repr=False)
-    triangle_angle: np.ndarray = field(repr=False)
-    triangle_log_area: np.ndarray = field(repr=False)
-    triangle_orientation: np.ndarray = field(repr=False)
+    triangle_stretch: np.ndarray = _per_triangle()
+    triangle_angle: np.ndarray = _per_triangle()
+    triangle_log_area: np.ndarray = _per_triangle()
+    triangle_orientation: np.ndarray = _per_triangle()
 
     def to_dict(self):
         """The measures without the arrays."""
@@ -47,8 +51,7 @@ def measure(surface, uv):
 def measure_pieces(surface, uv):
     """The `Distortion` of every piece's map, a list."""
     larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
-    share = np.where(surface.degenerate, 0, surface.area)
-    share /= surface.sums(share)[surface.piece]
+    share = surface.measure / surface.sums(surface.measure)[surface.piece]
     squared, dirichlet, angle, log_area = by_parts(_measures, larger, smaller)
     sign = orientation(uv, surface.triangles)
     sign[(sign == 0) & surface.degenerate] = 1
@@ -83,14 +86,14 @@ def distortion(vertices, triangles, uv):
     Raises a subclass of `SurfaceError` for a bad surface, `UVError` for bad UVs.
     """
     surface = Surface(vertices, triangles)
-    return measure(surface, checked_uv(surface, uv))
+    return measure(surface, checked_uv(len(surface.vertices), uv))
 
 
-def checked_uv(surface, uv):
+def checked_uv(n: int, uv) -> np.ndarray:
     """`uv` as an (n, 2) array of finite floats; raises `UVError`."""
     uv = np.asarray(uv, dtype=np.float64)
-    if uv.shape != (len(surface.vertices), 2):
-        raise UVError(f"the UVs must have the shape ({len(surface.vertices)}, 2), not {uv.shape}")
+    if uv.shape != (n, 2):
+        raise UVError(f"the UVs must have the shape ({n}, 2), not {uv.shape}")
     if not np.isfinite(uv).all():
         raise UVError("some UVs are no numbers (NaN or infinite): reset them, or start from another map")
     return uv

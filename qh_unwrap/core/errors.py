@@ -6,6 +6,18 @@ class UnwrapError(ValueError):
     """Base of every error that the core raises about its input."""
 
 
+class OutOfMemoryError(UnwrapError):
+    """The memory does not suffice."""
+
+
+class SingularError(UnwrapError):
+    """The equations for the island have no solution."""
+
+
+class InternalError(UnwrapError):
+    """Something unforeseen went wrong with one island; its traceback is printed."""
+
+
 class SettingsError(UnwrapError):
     """A setting is out of its range, or two settings exclude each other."""
 

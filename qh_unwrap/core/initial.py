@@ -3,27 +3,19 @@
 
 import numpy as np
 
-from .errors import UVError
+from .chart import Surface
+from .domain import Fixed, Held
 from .pieces import starts_of
-from .solver import Dirichlet
 from .triangles import corners_of, normals, sums_by_parts
 from .weights import cotangent, mean_value, uniform
 
 _WEIGHTS = {"UNIFORM": uniform, "HARMONIC": cotangent, "MEAN_VALUE": mean_value}
 
 
-def initial_map(surface, initial, dirichlet, uv=None):
-    """The map `initial` (n, 2) of a surface, with the vertices that `dirichlet` holds in their places."""
-    if initial in _WEIGHTS:
-        return dirichlet.solve(_WEIGHTS[initial](surface))
-    if initial == "CURRENT":
-        if uv is None:
-            raise UVError("to start from the current UVs there must be some: choose another start")
-        start = uv
-    else:
-        start = project(surface) if initial == "PROJECTION" else conformal(surface)
-    held = dirichlet.held
-    return np.where(held[:, None], dirichlet.values, fit(start, held, dirichlet.values, mirror=True))
+def weighted_map(domain: Held, initial: str) -> np.ndarray:
+    """The map (n, 2) of a domain by the fixed weights that `initial` names, with what is held in its place."""
+    make = _WEIGHTS[initial]
+    return domain.constrained.solve(domain.triangles.joined([make(chart) for chart in domain.charts]))
 
 
 def fit(points, chosen, targets, mirror=False):
@@ -74,36 +66,52 @@ def project(surface):
     return np.array([along, np.einsum("ij,ij->i", surface.vertices, up[piece])]).T
 
 
-def conformal(surface):
+def conformal(surface: Surface) -> np.ndarray:
     """Conformal map of every piece with a natural boundary, (n, 2): the flattening of Sawhney, Crane 2017 that scales
     no outline.
 
     Of all conformal maps of a disk it has the least area distortion: its scale factors exp(u) are 1 along the outline,
-    u solves Yamabe's equation, and tells how much the outline turns at each vertex.  Holes are closed meanwhile, if
-    there is only one piece; several must have none.
+    u solves Yamabe's equation, and tells how much the outline turns at each vertex.  Holes are closed meanwhile.
     """
-    solid = surface.filled()
-    outlines = surface.loops[: len(surface.vertex_starts)]
-    loop = np.concatenate(outlines)
-    starts = starts_of(outlines)
-    n = len(solid.vertices)
-    held = np.zeros(n, bool)
-    held[loop] = True
-    weights = cotangent(solid)
-    solve = Dirichlet(solid.order, solid.edges, held, np.zeros((n, 2))).factor(weights)
-    u = solve(np.zeros((n, 1)), (solid.angle_sums - 2 * np.pi)[:, None])[:, 0]
-    i, j = solid.edges.T
+    loop = np.concatenate(surface.outlines)
+    starts = starts_of(surface.outlines)
+    fixed = Fixed(np.zeros((len(surface.vertices), 2), bool), np.zeros((len(surface.vertices), 2)))
+    fixed.held[loop] = True
+    solid = Held(surface, fixed, surface.plugs(solid=True))
+    n = len(solid.vertex_piece)
+    weights = solid.triangles.joined([cotangent(chart) for chart in solid.charts])
+    angle_sums = sum(chart.angle_sums(n) for chart in solid.charts)
+    solve = solid.constrained.factor(weights)
+    u = solve(np.zeros((n, 1)), (angle_sums - 2 * np.pi)[:, None])[:, 0]
+    i, j = solid.triangles.edges.T
     flux = np.bincount(i, weights[0] * (u[i] - u[j]), n) + np.bincount(j, weights[1] * (u[j] - u[i]), n)
 
-    direction = np.cumsum(np.pi - solid.angle_sums[loop] + flux[loop])  # of the side that follows each vertex
+    direction = np.cumsum(np.pi - angle_sums[loop] + flux[loop])  # of the side that follows each vertex
     along = np.column_stack([np.cos(direction), np.sin(direction)])
-    following = np.concatenate([np.roll(outline, -1) for outline in outlines])
+    following = np.concatenate([np.roll(outline, -1) for outline in surface.outlines])
     length = np.linalg.norm(surface.vertices[following] - surface.vertices[loop], axis=1)
     # Close every outline by the least change of its lengths.
     gap = np.add.reduceat(length[:, None] * along, starts)
     stiffness = np.add.reduceat(length[:, None, None] * along[:, :, None] * along[:, None], starts)
-    change = (np.linalg.pinv(stiffness) @ gap[:, :, None])[solid.vertex_piece[loop], :, 0]
+    change = (np.linalg.pinv(stiffness) @ gap[:, :, None])[surface.vertex_piece[loop], :, 0]
     length = length * (1 - (along * change).sum(axis=1))
     outline = np.zeros((n, 2))
     outline[following] = np.cumsum(length[:, None] * along, axis=0)  # closed, they end where the next one begins
-    return solve(outline)[: len(surface.vertices)]
+    return _turned_by_farthest(surface, solve(outline)[: len(surface.vertices)])
+
+
+def _turned_by_farthest(surface, uv):
+    """Every piece's map (n, 2) turned so that the vertex farthest from its middle lies to the right, whatever the
+    vertices' numbers are.
+    """
+    piece, starts = surface.vertex_piece, surface.vertex_starts
+    count = np.diff(starts, append=len(uv))
+    z = uv @ np.array([1, 1j])
+    z = z - (np.add.reduceat(z, starts) / count)[piece]
+    distance = np.abs(z)
+    is_farthest = distance == np.maximum.reduceat(distance, starts)[piece]
+    farthest = np.flatnonzero(is_farthest)
+    farthest = farthest[np.diff(piece[farthest], prepend=-1) > 0]
+    way = np.conj(z[farthest]) / np.maximum(distance[farthest], np.finfo(float).tiny)
+    z = z * way[piece]
+    return np.column_stack([z.real, z.imag])

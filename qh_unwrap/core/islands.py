@@ -23,6 +23,7 @@ class Island:
     vertices: np.ndarray  # (n,) mesh vertex of each island vertex
     triangles: np.ndarray  # (t, 3) island vertices
     triangle_corners: np.ndarray  # (t, 3) the same as mesh corners
+    drawn_corners: np.ndarray  # (t, 3) the mesh's own triangles of the faces, as mesh corners
     crowded_edges: int = 0  # edges of its outline where more than two faces meet
 
 
@@ -44,7 +45,8 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
     uv_vertex = _uv_vertices(one, start, end, following)
     face_island = components(face_count, corner_face[one], corner_face[start])[1]
 
-    corner_triangles = _without_doubled_diagonals(corner_triangles, following, uv_vertex)
+    drawn = corner_triangles
+    corner_triangles = _without_doubled_diagonals(drawn, following, uv_vertex)
     chosen = np.flatnonzero(selected)
     _, first, rank = np.unique(face_island[chosen], return_index=True, return_inverse=True)
     island_order = np.argsort(np.argsort(first))  # by the first face
@@ -66,7 +68,7 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
 
     crowded = (np.bincount(corner_edge[chosen_corners], minlength=len(seam)) > 2) & ~seam
     crowded_corners = chosen_corners[crowded[corner_edge[chosen_corners]]]
-    pairs = np.unique(corner_rank[crowded_corners] * len(seam) + corner_edge[crowded_corners])
+    pairs = np.unique(corner_rank[crowded_corners] * np.int64(len(seam)) + corner_edge[crowded_corners])
     crowded_edges = np.bincount(pairs // max(len(seam), 1), minlength=len(first)).tolist()
 
     def split(values, starts):
@@ -82,6 +84,7 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
         "vertices": split(mesh_vertex[used], first_vertex),
         "triangles": split(island_vertex[corner_triangles[triangles]], triangle_starts),
         "triangle_corners": split(corner_triangles[triangles], triangle_starts),
+        "drawn_corners": split(drawn[triangles], triangle_starts),
         "crowded_edges": crowded_edges,
     }
     return [Island(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
@@ -148,7 +151,7 @@ def _without_doubled_diagonals(triangles, following, uv_vertex):
     for _ in range(8):
         halves = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
         low, high = np.sort(uv_vertex[halves], axis=1).T
-        _, edge, uses = np.unique(low * (uv_vertex.max() + 1) + high, return_inverse=True, return_counts=True)
+        _, edge, uses = np.unique(low * np.int64(uv_vertex.max() + 1) + high, return_inverse=True, return_counts=True)
         is_diagonal = halves[:, 1] != following[halves[:, 0]]
         doubled = np.flatnonzero(is_diagonal & (uses[edge] > 2))
         if not len(doubled):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Large meshes in an order in which neighbours in space are neighbours in memory, where processors find them sooner."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,6 +29,10 @@ class Sorted:
         """The same in the mesh's own order."""
         return values[self._place]
 
+    def renumbered(self, vertices):
+        """For every sorted vertex (n, ...) the sorted number of the vertex that it is given."""
+        return self._place[vertices][self._order]
+
     def own_triangles(self, triangles):
         """The numbers that triangles have in the mesh's own order."""
         return self._triangle_order[triangles]
@@ -42,5 +46,5 @@ class Sorted:
     def _restored_distortion(self, distortion):
         if distortion is None:
             return None
-        names = ("triangle_stretch", "triangle_angle", "triangle_log_area", "triangle_orientation")
+        names = [field.name for field in fields(distortion) if field.metadata.get("per_triangle")]
         return replace(distortion, **{name: getattr(distortion, name)[self._triangle_place] for name in names})

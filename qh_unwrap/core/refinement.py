@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from .surface import Surface
+from .chart import Surface
 from .triangles import corner_angles
 from .weights import cotangent
 
@@ -56,7 +56,7 @@ def negative_edges(surface):
 def _opposite(surface):
     """For every edge the sum of the angles that face it, and where along it the heights meet it on average."""
     edge = surface.half_edge_edges
-    angle = np.roll(corner_angles(surface.flat), -2, axis=1).T.ravel()
+    angle = np.roll(corner_angles(surface.rest), -2, axis=1).T.ravel()
     third = np.roll(surface.triangles.T, -2, axis=0).ravel()
     start, end = surface.vertices[surface.edges[edge]].transpose(1, 0, 2)
     along = end - start

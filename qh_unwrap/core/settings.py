@@ -5,6 +5,7 @@ The operator, the panel, the command line and the Python API are all made from t
 """
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from .errors import SettingsError
@@ -72,7 +73,7 @@ class Settings:
     iterations: int = setting(
         6,
         "Iterations",
-        "At most this many improvements of the initial map; 0 keeps the initial map",
+        "At most this many improvements of the initial map, before it is refined",
         range=(0, 1000),
         soft_range=(0, 30),
     )
@@ -88,7 +89,7 @@ class Settings:
         30,
         "Refine",
         "At most this many steps from there to the least distortion (cotangent weights); 0 keeps the quasi-harmonic"
-        " map itself",
+        " map itself, or with 0 iterations the initial map",
         range=(0, 1000),
         soft_range=(0, 100),
     )
@@ -107,7 +108,7 @@ class Settings:
     tolerance: float = setting(
         1e-3,
         "Tolerance",
-        "Stop when no vertex moves by more than this part of the layout's size",
+        "Without refinement, stop when no vertex moves by more than this part of the layout's size",
         range=(0.0, 1.0),
         soft_range=(0.0, 0.01),
     )
@@ -115,6 +116,29 @@ class Settings:
     def __post_init__(self):
         for field in dataclasses.fields(self):
             check(field, getattr(self, field.name))
+
+    def check_together(self) -> None:
+        """Raise `SettingsError` where settings exclude each other."""
+        for excluded, text in _EXCLUDED:
+            if excluded(self):
+                raise SettingsError(text.format(self))
+
+
+# What does not go with what, and what to do then
+_EXCLUDED: tuple[tuple[Callable[[Settings], bool], str], ...] = (
+    (
+        lambda its: its.weights == "MEAN_VALUE" and its.balance > 0.5,
+        "mean value weights diverge for a balance above 0.5: lower it, or use the weights COTANGENT",
+    ),
+    (
+        lambda its: its.weights == "MEAN_VALUE_SCALAR" and its.balance == 1,
+        "area-only weights change nothing at balance 1: lower it, or take the start MEAN_VALUE with 0 iterations",
+    ),
+    (
+        lambda its: its.boundary == "FREE" and its.weights != "COTANGENT",
+        "a free boundary needs the weights COTANGENT, not {0.weights}: change them, or choose the boundary CIRCLE",
+    ),
+)
 
 
 def check(field, value):
@@ -128,7 +152,7 @@ def check(field, value):
             raise SettingsError(f"{field.name} is {value!r}: choose True or False")
     else:
         low, high = meta["range"]
-        whole = field.type is not int or value == int(value)
-        if not (low <= value <= high and whole):
+        # A value that is no number lies in no range.
+        if not (low <= value <= high and (field.type is not int or value == int(value))):
             kind = "a whole number" if field.type is int else "a number"
             raise SettingsError(f"{field.name} is {value!r}: choose {kind} from {low} to {high}")

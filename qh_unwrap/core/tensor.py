@@ -16,9 +16,9 @@ from .triangles import by_parts, corners_of
 _SMALLEST = 1e-12  # squared stretches, and their ratios, are kept within this and its inverse
 
 
-def jacobian(surface, uv):
+def jacobian(chart, uv):
     """Jacobian of the map from the surface to the plane in every triangle, (2, 2, m)."""
-    return jacobian_of(surface.triangles.T, surface.hats, uv)
+    return jacobian_of(chart.triangles.T, chart.hats, uv)
 
 
 def jacobian_of(corners, hats, uv):
@@ -34,25 +34,25 @@ def jacobian_of(corners, hats, uv):
     return by_parts(derivative, corners, hats)
 
 
-def area_scale(surface, jacobian):
-    """The layout's area by the surface's (m,), that of the piece of each triangle; never zero.
+def area_scale(chart, jacobian):
+    """The layout's area by the chart's, of every piece, (p,); never zero.
 
     Dividing squared stretches by it makes them free of scale.
     """
     (a, b), (c, d) = jacobian
-    area = np.where(surface.air, 0, surface.area)
-    scale = np.abs(surface.sums(area * (a * d - b * c))) / surface.sums(area)
-    return np.maximum(scale, 1e-300)[surface.piece]
+    scale = np.abs(chart.sums(chart.area * (a * d - b * c))) / chart.sums(chart.area)
+    return np.maximum(scale, 1e-300)
 
 
-def squared_stretches(surface, uv, side="right", smallest=_SMALLEST):
+def squared_stretches(chart, uv, side="right", smallest=_SMALLEST, scale=None):
     """Squared singular values of the map, free of scale, and twice the angle of the direction of the larger.
 
-    `side` "right" gives directions on the surface (in `surface.flat`), "left" in the plane.
+    `side` "right" gives directions on the surface (in `chart.rest`), "left" in the plane.
+    `scale` (p,) is that of the pieces, by default what the chart alone has.
     Returns (larger, smaller, cos 2 theta, sin 2 theta), each (m,).
     """
-    G = jacobian(surface, uv)
-    scale = area_scale(surface, G)
+    G = jacobian(chart, uv)
+    scale = (area_scale(chart, G) if scale is None else scale)[chart.piece]
 
     def stretches(G, scale):
         (g11, g12), (g21, g22) = G if side == "right" else G.swapaxes(0, 1)
@@ -70,28 +70,28 @@ def squared_stretches(surface, uv, side="right", smallest=_SMALLEST):
     return by_parts(stretches, G, scale)
 
 
-def surface_tensor(surface, uv, balance, power=1.0):
+def surface_tensor(chart, uv, balance, power=1.0, scale=None):
     """The quasi-harmonic operator's tensor M(t, q), carried to the surface's triangles, (3, m).
 
     `balance` is t: 1 conformal (the identity), 1/2 the paper's C^-1 (eq. 10), 0 authalic; `power` is q.  The stiffness
     matrix assembled with it on the surface equals that of M on the plane `uv`.
     """
-    larger, smaller, cos, sin = squared_stretches(surface, uv)
+    larger, smaller, cos, sin = squared_stretches(chart, uv, scale=scale)
     along, across = _powers(larger, smaller, balance, power)
     aspect = np.sqrt(smaller / larger)
-    return _from_eigenvalues(surface, along * aspect, across / aspect, cos, sin)
+    return _from_eigenvalues(along * aspect, across / aspect, cos, sin)
 
 
-def plane_tensor(surface, uv, balance, power=1.0):
+def plane_tensor(chart, uv, balance, power=1.0, scale=None):
     """The same tensor M(t, q) on the triangles of the plane `uv`, (3, m)."""
-    larger, smaller, cos, sin = squared_stretches(surface, uv, side="left")
-    return _from_eigenvalues(surface, *_powers(larger, smaller, balance, power), cos, sin)
+    larger, smaller, cos, sin = squared_stretches(chart, uv, side="left", scale=scale)
+    return _from_eigenvalues(*_powers(larger, smaller, balance, power), cos, sin)
 
 
-def scalar_tensor(surface, uv, balance, power=1.0):
+def scalar_tensor(chart, uv, balance, power=1.0, scale=None):
     """The scalar kappa of eq. (15), the square root of det M(t, q), (m,)."""
-    larger, smaller, *_ = squared_stretches(surface, uv)
-    return np.where(surface.air, 1.0, (larger * smaller) ** (power * (1 - balance) / 2))
+    larger, smaller, *_ = squared_stretches(chart, uv, scale=scale)
+    return (larger * smaller) ** (power * (1 - balance) / 2)
 
 
 def _powers(larger, smaller, t, q):
@@ -100,8 +100,6 @@ def _powers(larger, smaller, t, q):
     return common * larger ** (q * t), common * smaller ** (q * t)
 
 
-def _from_eigenvalues(surface, first, second, cos, sin):
-    # Air is as good as it lies: its tensor is the identity.
-    first, second = np.where(surface.air, 1.0, [first, second])
+def _from_eigenvalues(first, second, cos, sin):
     mean, half = (first + second) / 2, (first - second) / 2
     return np.array([mean + half * cos, mean - half * cos, half * sin])

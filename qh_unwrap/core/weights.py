@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Edge weights that discretise div(M grad f) = 0, and the schemes that make them from a map.
 
-Weights are a (2, k) array over `surface.edges` (i, j): row 0 is the weight of j in the equation of i, row 1 the weight
+Weights are a (2, k) array over a chart's `edges` (i, j): row 0 is the weight of j in the equation of i, row 1 the weight
 of i in the equation of j.  In all equations `sum_j w_ij (f_i - f_j) = 0` (eq. 2).
 """
 
 import numpy as np
 
-from .tensor import plane_tensor, scalar_tensor, squared_stretches, surface_tensor
+from .tensor import area_scale, jacobian, plane_tensor, scalar_tensor, squared_stretches, surface_tensor
 from .triangles import by_parts, corners_of, signed_areas
 
 
-def uniform(surface):
+def uniform(chart):
     """Tutte's weights: every edge 1."""
-    return np.ones((2, len(surface.edges)))
+    return np.ones((2, len(chart.edges)))
 
 
-def cotangent(surface, tensor=None, corners=None):
-    """Finite element weights on the triangles `corners` (m, 3, 2), the surface's own by default, eq. (12).
+def cotangent(chart, tensor=None, corners=None):
+    """Finite element weights on the triangles `corners` (m, 3, 2), the chart's own by default, eq. (12).
 
     `tensor` (3, m) is constant on each triangle; None is the identity, which gives the cotangents.
     """
-    corners = surface.flat if corners is None else corners
+    corners = chart.rest if corners is None else corners
     area = np.abs(signed_areas(corners))
     least = 1e-12 * area.max()
 
@@ -37,17 +37,17 @@ def cotangent(surface, tensor=None, corners=None):
         return product / (-4 * np.maximum(area, least))
 
     fields = (corners.T, area) if tensor is None else (corners.T, area, tensor)
-    w = np.bincount(surface.triangle_edges.T.ravel(), by_parts(half_edge_weights, *fields).ravel(), len(surface.edges))
+    w = np.bincount(chart.triangle_edges.T.ravel(), by_parts(half_edge_weights, *fields).ravel(), len(chart.edges))
     return np.stack([w, w])
 
 
-def mean_value(surface, tensor=None, corners=None):
-    """Mean value weights on the triangles `corners` (m, 3, 2), the surface's own by default.
+def mean_value(chart, tensor=None, corners=None):
+    """Mean value weights on the triangles `corners` (m, 3, 2), the chart's own by default.
 
     `tensor` (3, m) gives appendix A of the paper, (m,) the scalar kappa of eq. (15), None those of Floater 2003.
     Always positive for positive definite tensors.  Flipped triangles count by their absolute angles.
     """
-    corners = surface.flat if corners is None else corners
+    corners = chart.rest if corners is None else corners
     edge = np.roll(corners, -1, axis=1) - corners
     length = np.linalg.norm(edge, axis=2)
     shortest = max(1e-12 * length.max(), np.finfo(float).tiny)
@@ -68,7 +68,7 @@ def mean_value(surface, tensor=None, corners=None):
         a, b, c = _in_edge_frame(tensor, ex, ey, side)
         # Seen from the edge's end its direction turns by half a circle and the normal stays: c changes its sign.
         parts = [_appendix_a(a, b, c, *at_start), _appendix_a(a, b, -c, *at_end)]
-    return _directed(surface, *(part / length for part in parts))
+    return _directed(chart, *(part / length for part in parts))
 
 
 def _in_edge_frame(tensor, ex, ey, side):
@@ -86,10 +86,10 @@ def _appendix_a(a, b, c, sin, tan_half):
     return ((a + 2 * b + 2 * c * sin) * tan_half + (a - b) * sin) / 3
 
 
-def _directed(surface, at_start, at_end):
+def _directed(chart, at_start, at_end):
     # Sum the weights that half-edges (3, m) give to the equations of their start and of their end.
-    start, end = surface.half_edges
-    edge, k = surface.half_edge_edges, len(surface.edges)
+    start, end = chart.half_edges
+    edge, k = chart.half_edge_edges, len(chart.edges)
     forward = start < end
     at_start, at_end = at_start.ravel(), at_end.ravel()
     return np.stack(
@@ -106,36 +106,47 @@ class Stretch:
     """
 
     def __init__(self):
-        self.weights = None
+        self._weights = {}
 
-    def __call__(self, domain, uv):
-        surface = domain.surface
-        if self.weights is None:
-            self.weights = mean_value(surface)
-        larger, smaller, *_ = squared_stretches(surface, uv)
-        area = np.repeat(surface.area, 3)
-        corner = surface.triangles.ravel()
+    def __call__(self, chart, uv):
+        weights = self._weights.get(id(chart))
+        if weights is None:
+            weights = mean_value(chart)
+        larger, smaller, *_ = squared_stretches(chart, uv)
+        area = np.repeat(chart.area, 3)
+        corner = chart.triangles.ravel()
         squared = np.repeat((1 / larger + 1 / smaller) / 2, 3)
-        stretch = np.sqrt(np.bincount(corner, area * squared) / np.bincount(corner, area))
-        i, j = surface.edges.T
-        self.weights = self.weights / np.stack([stretch[j], stretch[i]])
-        return self.weights
+        total = np.maximum(np.bincount(corner, area), np.finfo(float).tiny)
+        stretch = np.sqrt(np.bincount(corner, area * squared) / total)
+        i, j = chart.edges.T
+        self._weights[id(chart)] = weights / np.stack([stretch[j], stretch[i]])
+        return self._weights[id(chart)]
 
 
 def scheme(settings):
-    """The function of a domain and a map `uv` (n, 2) that makes the next weights, as the settings choose."""
+    """The function of charts and a map `uv` (n, 2) that makes each chart's next weights, as the settings choose.
+
+    Air is as good as it lies: its tensor is the identity.
+    """
     t, q = settings.balance, settings.tensor_power
+    stretch = Stretch()
 
-    def cotangent_weights(domain, uv):
-        surface = domain.surface
-        tensor = domain.balanced(uv, surface_tensor(surface, uv, t, q))
-        return cotangent(surface, tensor, surface.shapes_in(uv))
-
-    def mean_value_weights(domain, uv):
-        surface = domain.surface
+    def of(chart, uv, scale):
+        if settings.weights == "COTANGENT":
+            tensor = None if chart.is_air else surface_tensor(chart, uv, t, q, scale)
+            return cotangent(chart, tensor, chart.shapes(uv))
+        if chart.is_air:
+            return mean_value(chart, None, chart.shapes(uv))
+        if settings.weights == "STRETCH":
+            return stretch(chart, uv)
         tensor = plane_tensor if settings.weights == "MEAN_VALUE" else scalar_tensor
-        return mean_value(surface, tensor(surface, uv, t, q), corners_of(uv, surface.triangles))
+        return mean_value(chart, tensor(chart, uv, t, q, scale), corners_of(uv, chart.triangles))
 
-    if settings.weights == "STRETCH":
-        return Stretch()
-    return cotangent_weights if settings.weights == "COTANGENT" else mean_value_weights
+    def of_all(charts, uv):
+        # Charts beside the island have its scale, if they are no air, which has none.
+        scale = (
+            area_scale(charts[0], jacobian(charts[0], uv)) if any(not chart.is_air for chart in charts[1:]) else None
+        )
+        return [of(chart, uv, scale) for chart in charts]
+
+    return of_all

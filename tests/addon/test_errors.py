@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scenes import add_cube, add_grid, changes, edit_mode, mesh_object, snapshot, uvs
 
-from qh_unwrap.addon import files, memory, mesh_arrays, operators
+from qh_unwrap.addon import files, mesh_arrays, operators
+from qh_unwrap.core import memory
 from qh_unwrap.addon.outcome import summary
 
 _MESHES = os.environ.get("QH_MESHES")

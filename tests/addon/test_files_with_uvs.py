@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scenes import uvs
 
-from qh_unwrap.addon import files, mesh_arrays, operators, placing
+from qh_unwrap.addon import files, mesh_arrays, operators
+from qh_unwrap.core import placing
 from qh_unwrap.core.islands import find_islands
 
 _MESHES = os.environ.get("QH_MESHES")

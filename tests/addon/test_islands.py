@@ -4,7 +4,7 @@ import pytest
 
 from qh_unwrap.core.errors import DuplicateError, WindingError
 from qh_unwrap.core.islands import attached, cuts, find_islands
-from qh_unwrap.core.surface import Surface
+from qh_unwrap.core.chart import Surface
 
 
 def mesh(faces, seams=()):

@@ -161,7 +161,9 @@ def test_vertex_between_two_quads_only():
     obj.select_set(True)
     assert unwrap() == {'FINISHED'}
     (outcome,) = operators.last_outcomes
-    assert (outcome.after.flips, outcome.after.collapsed) == (0, 0)
+    # Of both triangles with the same corners one is flipped in any map.
+    assert (outcome.after.flips, outcome.after.collapsed) == (1, 0) and not outcome.injective
+    assert any("same diagonal: triangulate them" in text for text in outcome.warnings)
 
 
 def test_seams_split_and_open():
@@ -230,9 +232,13 @@ def test_kept_outline_and_pins_stay_exactly():
     assert unwrap(boundary='KEEP', placement='PACK') == {'FINISHED'}
     assert changes(before, snapshot(obj)) == {"UVMap"}
     new = uvs(obj)
-    assert np.array_equal(new[held], old[held])
+    # Blender's own corners at a vertex differ in the last bit; now they agree, on one of them.
+    vertex = np.array([loop.vertex_index for loop in obj.data.loops])
+    for k in np.unique(vertex[held]):
+        assert (new[vertex == k] == new[vertex == k][0]).all()
+        assert (new[vertex == k][0] == old[vertex == k]).all(axis=1).any()
     assert not np.array_equal(new[~held], old[~held])
-    assert operators.last_outcomes[0].after.flips == 0
+    assert operators.last_outcomes[0].after.flips == 0 and operators.last_outcomes[0].injective
 
 
 def test_kept_outline_of_mirrored_uvs():
@@ -394,7 +400,7 @@ def test_settings_reach_the_core():
     add_grid(4)
     unwrap(iterations=1, weights='MEAN_VALUE', boundary='CIRCLE')
     assert operators.last_outcomes[0].iterations == 1
-    unwrap(iterations=0)
+    unwrap(iterations=0, refine=0)
     assert operators.last_outcomes[0].iterations == 0
 
 
@@ -456,7 +462,7 @@ def test_scripts_get_the_operators_own_defaults():
 
 def test_operator_forgets_what_a_script_set():
     add_grid(4)
-    unwrap(iterations=0)
+    unwrap(iterations=0, refine=0)
     assert operators.last_outcomes[0].iterations == 0
     unwrap()
     assert operators.last_outcomes[0].iterations > 0

@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from qh_unwrap.addon.overlaps import overlap, overlapping
+from qh_unwrap.core.overlaps import overlap, overlapping
 
 _TRIANGLE = np.array([[(0, 0), (1, 0), (0, 1)]], dtype=float)
 

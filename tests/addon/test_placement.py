@@ -5,7 +5,8 @@ import pytest
 from scenes import add_grid, edit_mode, mesh_object, uvs
 from scipy.spatial import Delaunay
 
-from qh_unwrap.addon import operators, placing
+from qh_unwrap.addon import operators
+from qh_unwrap.core import placing
 from qh_unwrap.addon.outcome import sentences, summary
 
 

@@ -14,7 +14,7 @@ from scenes import add_cube, add_grid, changes, edit_mode, snapshot, uvs
 from qh_unwrap.addon import operators, running, selection, unwrapping
 from qh_unwrap.addon.options import MeshOptions
 from qh_unwrap.addon.running import InSteps, Run
-from qh_unwrap.core import Settings, together
+from qh_unwrap.core import Settings, unwrapping as driver
 
 TIMER = SimpleNamespace(type='TIMER', value='NOTHING')
 ESC = SimpleNamespace(type='ESC', value='PRESS')
@@ -96,7 +96,7 @@ def _no_outcomes():
 @pytest.fixture(autouse=True)
 def _one_by_one(monkeypatch):
     """Islands are unwrapped one by one, however small."""
-    monkeypatch.setattr(together, "_SMALL", 0)
+    monkeypatch.setattr(driver, "_TOGETHER", 0)
 
 
 def begun(**arguments):
@@ -261,10 +261,10 @@ def test_swallows_everything_else(slow):
 
 
 def test_small_islands_are_done_together_and_can_be_cancelled(slow, monkeypatch):
-    monkeypatch.setattr(together, "_SMALL", 8)
-    monkeypatch.setattr(together, "_AT_ONCE", 16)
-    alone = []
-    monkeypatch.setattr(unwrapping, "unwrap_steps", lambda *_, **__: alone.append(1) or iter(()))
+    monkeypatch.setattr(driver, "_TOGETHER", 8)
+    monkeypatch.setattr(driver, "_AT_ONCE", 16)
+    sizes, original = [], driver.Unwrapper
+    monkeypatch.setattr(driver, "Unwrapper", lambda shapes, *rest: sizes.append(len(shapes)) or original(shapes, *rest))
     obj = add_grid(6, uv=False)
     for edge in obj.data.edges:  # every face an island
         edge.use_seam = True
@@ -274,24 +274,75 @@ def test_small_islands_are_done_together_and_can_be_cancelled(slow, monkeypatch)
     for _ in range(4):
         operator.modal(context, TIMER)
         shares.append(context.window.progress)
-    assert len(set(shares)) > 2 and not alone
+    assert len(set(shares)) > 2 and set(sizes) == {8}
     assert operator.modal(context, ESC) == {'CANCELLED'}
     assert context.window.is_clean and everything([obj]) == start
-    assert bpy.ops.uv.qh_unwrap() == {'FINISHED'} and not alone
+    assert bpy.ops.uv.qh_unwrap() == {'FINISHED'}
     assert len(operators.last_outcomes) == 36 and all(outcome.is_clean for outcome in operators.last_outcomes)
 
 
+def failing(monkeypatch, error, vertices=None):
+    """Sessions of islands with so many vertices, or of all, break off after two steps."""
+    original = driver.Unwrapper.step
+
+    def step(session):
+        session.taken = getattr(session, "taken", 0) + 1
+        sizes = [len(uv) for uv in np.split(session._course.now, session._course.batch.surface.vertex_starts[1:])]
+        if session.taken > 2 and (vertices is None or vertices in sizes):
+            raise error
+        return original(session)
+
+    monkeypatch.setattr(driver.Unwrapper, "step", step)
+
+
+@pytest.mark.parametrize("together", [0, 5000])
 @pytest.mark.parametrize("start", ["execute", "invoke"])
-def test_exception_leaves_nothing_behind(slow, monkeypatch, start, capsys):
+def test_exception_fails_the_island_alone(slow, monkeypatch, start, together, capsys):
+    monkeypatch.setattr(driver, "_TOGETHER", together)
+    add_grid(4, "One")
+    add_grid(3, "Other", location=(3, 0, 0))
+    failing(monkeypatch, ZeroDivisionError("by zero"), 25)
+    if start == "execute":
+        operator, context = Unwrapping(), Context()
+        result = operator.execute(context)
+    else:
+        operator, context = begun()
+        while (result := operator.modal(context, TIMER)) == {'RUNNING_MODAL'}:
+            pass
+    assert result == {'FINISHED'} and context.window.is_clean
+    one, other = operators.last_outcomes
+    assert "ZeroDivisionError: by zero" in one.error and other.is_clean
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("start", ["execute", "invoke"])
+def test_exception_in_every_island_leaves_nothing_behind(slow, monkeypatch, start):
+    objects = scene()
+    before = everything(objects)
+    failing(monkeypatch, ZeroDivisionError("by zero"))
+    if start == "execute":
+        operator, context = Unwrapping(), Context()
+        assert operator.execute(context) == {'CANCELLED'}
+    else:
+        operator, context = begun()
+        while (result := operator.modal(context, TIMER)) == {'RUNNING_MODAL'}:
+            pass
+        assert result == {'CANCELLED'}
+    assert all("ZeroDivisionError" in outcome.error for outcome in operators.last_outcomes)
+    assert context.window.is_clean and operator._run is None
+    assert everything(objects) == before
+
+
+@pytest.mark.parametrize("start", ["execute", "invoke"])
+def test_exception_beside_the_islands_leaves_nothing_behind(slow, monkeypatch, start, capsys):
     objects = scene()
     before = everything(objects)
 
-    def steps(*_arguments, **_keywords):
-        yield SimpleNamespace(iteration=1)
-        yield SimpleNamespace(iteration=2)
+    def broken(*_arguments):
+        yield 0.5
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr(unwrapping, "unwrap_steps", steps)
+    monkeypatch.setattr(unwrapping, "unwrap_islands", broken)
     if start == "execute":
         operator, context = Unwrapping(), Context()
         with pytest.raises(ZeroDivisionError):
@@ -307,18 +358,12 @@ def test_exception_leaves_nothing_behind(slow, monkeypatch, start, capsys):
     assert everything(objects) == before
 
 
-def test_memory_that_runs_out_fails_the_island_alone(slow, monkeypatch):
+@pytest.mark.parametrize("together", [0, 5000])
+def test_memory_that_runs_out_fails_the_island_alone(slow, monkeypatch, together):
+    monkeypatch.setattr(driver, "_TOGETHER", together)
     add_grid(4, "One")
     add_grid(3, "Other", location=(3, 0, 0))
-    original = unwrapping.unwrap_steps
-
-    def steps(vertices, *arguments, **keywords):
-        yield SimpleNamespace(iteration=0)
-        if len(vertices) == 25:
-            raise MemoryError
-        return (yield from original(vertices, *arguments, **keywords))
-
-    monkeypatch.setattr(unwrapping, "unwrap_steps", steps)
+    failing(monkeypatch, MemoryError(), 25)
     operator, context = begun()
     while (result := operator.modal(context, TIMER)) == {'RUNNING_MODAL'}:
         pass

@@ -4,8 +4,8 @@
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from ..core.pieces import joined, numbers, starts_of
-from ..core.triangles import areas_in_space, box, corners_of, signed_areas
+from .pieces import joined, numbers, starts_of
+from .triangles import areas_in_space, box, corners_of, signed_areas
 
 _STEEPEST_FLAT = 0.25  # an island that climbs less than this, by the way along it, has no upper end
 
@@ -111,6 +111,11 @@ def areas(islands):
     """The areas in space, (k,), of islands given as (vertices, triangles)."""
     points, triangles, _, starts = joined(*zip(*islands, strict=True))
     return np.add.reduceat(areas_in_space(points, triangles), starts)
+
+
+def areas_of_triangles(vertices, triangles):
+    """The areas in space (t,) of triangles (t, 3) with vertices (n, 3)."""
+    return areas_in_space(vertices, triangles)
 
 
 def uv_areas(islands):

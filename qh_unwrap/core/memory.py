@@ -4,13 +4,9 @@
 import ctypes
 import sys
 
-from ..core import UnwrapError
+from .errors import OutOfMemoryError
 
 _PER_VERTEX = 3500  # bytes, measured on large islands: the factors take up to 1.4 kB of them, arrays the rest
-
-
-class MemoryNeededError(UnwrapError):
-    """The island needs more memory than is free."""
 
 
 def suffices(vertices, free):
@@ -19,9 +15,9 @@ def suffices(vertices, free):
 
 
 def check(vertices, free):
-    """Raise `MemoryNeededError` if they are not."""
+    """Raise `OutOfMemoryError` if they are not."""
     if not suffices(vertices, free):
-        raise MemoryNeededError(
+        raise OutOfMemoryError(
             f"it needs about {vertices * _PER_VERTEX / 1e9:.1f} GB of memory and {free / 1e9:.1f} GB are free:"
             " mark seams to cut it into smaller islands, or close other programs"
         )

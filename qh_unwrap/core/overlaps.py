@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..core.validity import near_boxes
+from .certificate import near_boxes
 from .placing import boxes
 
 _DEPTH = 1e-5  # of the size of the smaller triangle: what merely touches does not overlap

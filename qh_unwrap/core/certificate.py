@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which triangles are flipped, whether a map covers nothing twice, and the weights that turn triangles back."""
+"""The certificate: which triangles are flipped, and whether a map covers nothing twice, exactly.
+
+It speaks of the 32-bit floats that Blender stores.  Whoever certifies what Blender draws passes Blender's triangles.
+"""
 
 from fractions import Fraction
 
@@ -7,9 +10,6 @@ import numpy as np
 
 from .triangles import by_parts, corners_of
 
-_FLOOR = 0.1
-_ROUNDS = 8
-_HALVINGS = 10
 _PORTION = 1_000_000  # pairs at a time
 
 
@@ -87,6 +87,21 @@ def are_injective(uv, triangles, piece, loops, loop_piece):
     return ~wrong & (crossings(polygons, loop_piece, touching=True) == 0)
 
 
+def certified_pieces(surface, uv):
+    """Whether the map `uv` (n, 2) of every piece of a surface is certified, (p,) bool.
+
+    Triangles without area on the surface count only if they are flipped.
+    """
+    counts = surface.measure > 0
+    if counts.all():
+        triangles, piece = surface.triangles, surface.piece
+    else:
+        sign = orientation(uv, surface.triangles)
+        solid = counts | (sign != 0)
+        triangles, piece = surface.triangles[solid], surface.piece[solid]
+    return are_injective(uv, triangles, piece, surface.loops, surface.loop_piece)
+
+
 def enclosed_area(points):
     """Signed area within the closed polygon (n, 2), positive counter-clockwise."""
     return enclosed_areas([points])[0]
@@ -155,64 +170,14 @@ def near_boxes(low, high, group):
         yield one[near], other[near]
 
 
-def invalid(surface, uv):
-    """The triangles that are not positive though they could be, air included, (m,) bool."""
-    return (orientation(uv, surface.triangles) <= 0) & ~surface.degenerate
+def wrong_triangles(chart, uv):
+    """The triangles of a chart that are not positive though they could be, (m,) bool, in 32-bit floats."""
+    return (orientation(uv, chart.triangles) <= 0) & (chart.measure > 0)
 
 
-class Repair:
-    """Turns flipped triangles back by flooring the weights around them.
-
-    With `remember`, floored weights stay so in later solves; `active` tells whether any had to be floored, `shortened`
-    whether the last solve went only part of the way.
-    """
-
-    def __init__(self, remember):
-        self.remember = remember
-        self.active = False
-        self.shortened = False
-        self._marked = np.zeros(0, bool)
-
-    def solve(self, domain, weights, previous):
-        """The map for symmetric `weights` (2, k) and whether it is valid; where the island flips, with raised weights.
-
-        If that does not help, or only air flips, go part of the way from the `previous` map, where that one is valid.
-        """
-        surface, dirichlet = domain.surface, domain.dirichlet
-        self.shortened = False
-        marked = np.zeros(len(surface.vertices), bool)
-        if self.remember:
-            kept = self._marked[: len(marked)]  # air, the last, may have changed
-            marked[: len(kept)] = kept
-        for _ in range(_ROUNDS + 1):
-            uv = dirichlet.solve(_floored(dirichlet, surface.edges, weights, marked))
-            wrong = invalid(surface, uv)
-            if not wrong.any():
-                self._marked = marked
-                return uv, True
-            self.active = True
-            if not wrong[~surface.air].any():
-                break
-            marked[surface.triangles[wrong]] = True
-            for _ in range(2):  # and two rings around them
-                marked[surface.edges[marked[surface.edges].any(axis=1)]] = True
-        self._marked = marked
-        if not invalid(surface, previous).any():
-            self.shortened = True
-            for halving in range(1, _HALVINGS + 1):
-                shorter = previous + (uv - previous) / 2**halving
-                if not invalid(surface, shorter).any():
-                    return shorter, True
-            return previous, True
-        return uv, False
-
-
-def _floored(dirichlet, edges, weights, marked):
-    near = marked[edges].any(axis=1)
-    if not near.any():
-        return weights
-    diagonal = np.abs(dirichlet.diagonal(weights))
-    i, j = edges[near].T
-    floored = weights.copy()
-    floored[:, near] = np.maximum(weights[:, near], _FLOOR / 6 * np.sqrt(diagonal[i] * diagonal[j]))
-    return floored
+def wrong_pieces(charts, uv):
+    """The pieces of which a triangle, in any of the charts, is not positive though it could be, (p,) bool."""
+    wrong = np.zeros(charts[0].piece_count, bool)
+    for chart in charts:
+        wrong[chart.piece[wrong_triangles(chart, uv)]] = True
+    return wrong

@@ -1,95 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The plane around an island, as triangles: with it the outline is an inner line and finds its own shape.
+"""Air: the triangulated plane around an island, as far as a circle, and within its holes."""
 
-The paper's map takes the plane to itself.  So the island's triangles carry their tensors, and those of the air around
-it, as far as a fixed circle, the identity.  Where all are positive, the whole plane is mapped one to one.
-"""
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .certificate import orientation
+from .errors import BoundaryError
 from .pieces import components
-from .solver import Dirichlet
 from .triangles import corners_of, signed_areas
-from .validity import orientation
-from .weights import cotangent
 
-_RADIUS = 2.5  # of the fixed circle, by the island's
-_CIRCLE = 48  # vertices on it
-_COARSEST = 4  # steps of the coarsest air to the circle's radius
-_FINEST = 64  # the same for the island's radius: air need not be finer
-_WORN = 0.3  # air is renewed when a triangle keeps less than this of its quality
+Triangulator = Callable[[np.ndarray, np.ndarray], np.ndarray | None]
+"""A function of points (p, 2) and sides (s, 2), pairs of points, that returns the triangles (t, 3), all wound the same
+way, of a constrained Delaunay triangulation of exactly these points, or None where that cannot be."""
 
-
-class Exterior:
-    """An island whose outline is free.
-
-    Parameters
-    ----------
-    surface : Surface
-    triangulate : function of points (p, 2) and sides (s, 2) that returns the triangles (t, 3), all wound the same way,
-        of a constrained Delaunay triangulation of exactly these points, or None where that cannot be
-    pinned : (n,) bool, vertices that stay where they are, or None
-
-    After `renewed`, `surface` is the island with its air, whose vertices follow the island's, and `dirichlet` solves
-    on it, with the circle and the pins held.
-    """
-
-    def __init__(self, surface, triangulate, pinned=None):
-        self._island = surface
-        self._triangulate = triangulate
-        self._pinned = np.zeros(len(surface.vertices), bool) if pinned is None else pinned
-        self._quality = None
-        self.surface = surface
-        self.dirichlet = None
-
-    def renewed(self, uv):
-        """The map with good air: `uv` itself, or its first n rows with other vertices of air.
-
-        Returns None if there is no air yet and none can be made, since the outline crosses itself.
-        """
-        if self.dirichlet is not None:
-            now = _quality(corners_of(uv, self.surface.triangles[self.surface.air]))
-            if (now > _WORN * self._quality).all():
-                return uv
-        n = len(self._island.vertices)
-        air = make_air(uv[:n], self._island.loops, self._triangulate)
-        if air is None:  # the old air still serves
-            return None if self.dirichlet is None else uv
-        points, on_circle, triangles = air
-        uv = np.vstack([uv[:n], points])
-        self.surface = self._island.with_air(triangles, uv)
-        # Where the outline is all but straight, triangles may be inside out by rounding: they decide nothing.
-        self.surface.degenerate |= self.surface.air & (orientation(uv, self.surface.triangles) <= 0)
-        self.dirichlet = Dirichlet(
-            self.surface.order, self.surface.edges, np.concatenate([self._pinned, on_circle]), uv
-        )
-        self._quality = _quality(corners_of(uv, triangles))
-        return uv
-
-    def recalled(self, uv, n):
-        """An earlier map with new air around its first n vertices, or None where none can be made."""
-        self.dirichlet = None
-        return self.renewed(uv[:n])
-
-    def balanced(self, uv, tensor):
-        """The `tensor` (3, m), on the island times the factor that lets it press on the air as the air presses on it.
-
-        Without it the island would grow or shrink for ever; where the map is an isometry it is 1.
-        """
-        island = self._island
-        i, j = island.edges.T
-        weights = cotangent(island, tensor[:, : len(island.triangles)])[0]
-        energy = sum(weights @ (x[i] - x[j]) ** 2 for x in uv.T)
-        area = signed_areas(corners_of(uv, island.triangles)).sum()
-        return tensor * np.where(self.surface.air, 1.0, 2 * area / energy) if area > 0 else tensor
+_RADIUS = 2.5  # of the circle that ends the air, relative to that of the island
+_CIRCLE = 48  # vertices on the circle
+_COARSEST = 4  # edges of the coarsest air that reach from the middle to the circle
+_FINEST = 64  # edges of the finest air that reach across the island's radius
 
 
-def make_air(uv, loops, triangulate):
+class Air(NamedTuple):
+    """Air around one island of n vertices."""
+
+    points: np.ndarray  # (a, 2), its own vertices, numbered after the island's
+    on_circle: np.ndarray  # (a,) bool, those on the circle that ends it
+    triangles: np.ndarray  # (t, 3), all positive
+
+
+def make_air(uv: np.ndarray, loops: Sequence[np.ndarray], triangulate: Triangulator) -> Air | None:
     """Triangulate the plane outside the island's boundary `loops`, and within its holes, as far as a circle.
 
-    Returns the points that follow the n vertices `uv` (n, 2), which of them lie on the circle, and triangles (t, 3) of
-    all; None where the loops cross or are inside out, or `triangulate` fails.
+    `uv` (n, 2) is the island's map.  Returns None where the loops cross or are inside out, or `triangulate` fails.
     """
     outline = np.concatenate(loops)
     start = uv[outline]
@@ -110,6 +54,11 @@ def make_air(uv, loops, triangulate):
     triangles = triangulate(points, sides)
     if triangles is None:
         return None
+    triangles = np.asarray(triangles)
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
+        raise BoundaryError("the triangulator must return triangles, whole numbers in the shape (t, 3), or None")
+    if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points):
+        raise BoundaryError(f"the triangulator returned numbers of points outside 0 to {len(points) - 1}")
     if signed_areas(corners_of(points, triangles)).sum() < 0:
         triangles = triangles[:, ::-1]
     triangles = _outside(triangles, sides, len(points))
@@ -117,7 +66,10 @@ def make_air(uv, loops, triangulate):
         return None
     added = len(between) + _CIRCLE
     number = np.concatenate([outline, len(uv) + np.arange(added)])
-    return points[len(outline) :], np.arange(added) >= len(between), number[triangles]
+    points, triangles = points[len(outline) :], number[triangles]
+    # Where the outline is all but straight, triangles may be inside out by rounding: they decide nothing.
+    solid = orientation(np.vstack([uv, points]), triangles) > 0
+    return Air(points, np.arange(added) >= len(between), triangles[solid])
 
 
 def _graded_points(start, end, centre, radius):
@@ -193,7 +145,7 @@ def _outside(triangles, sides, n):
     return triangles[outside]
 
 
-def _quality(corners):
+def quality(corners: np.ndarray) -> np.ndarray:
     """1 for equilateral triangles (t, 3, 2), 0 for flat, negative for flipped ones."""
     sides = np.roll(corners, -1, axis=1) - corners
     return 4 * np.sqrt(3) * signed_areas(corners) / (sides**2).sum(axis=(1, 2))

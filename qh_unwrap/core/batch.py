@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shapes that are unwrapped together, checked and joined to one surface of many pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import locality
+from .boundary import outer_loop
+from .certificate import enclosed_area
+from .chart import Surface, normalised_pieces
+from .distortion import checked_uv
+from .domain import Fixed
+from .errors import PinError, ShapeError, UnwrapError, UVError
+from .pieces import joined
+from .report import Result, Shape
+from .settings import Settings
+from .topology import Topology, checked_arrays
+
+
+@dataclass(eq=False)
+class Batch:
+    """The sound ones of some shapes, as the pieces of one surface, and what is given of them."""
+
+    surface: Surface
+    index: np.ndarray  # (p,), the number of every piece's shape
+    uv: np.ndarray  # (n, 2), the given UVs, seen in the mirror where they are mirrored
+    has_uv: np.ndarray  # (p,) bool
+    pinned: np.ndarray  # (n, 2) bool
+    partner: np.ndarray | None  # (n, 2)
+    mirror: np.ndarray  # (p, 2), what to multiply UVs with: -1 for U in a mirror
+
+    @property
+    def has_pins(self) -> np.ndarray:
+        """(p,) bool"""
+        return np.logical_or.reduceat(self.pinned.any(axis=1), self.surface.vertex_starts)
+
+    @property
+    def fixed(self) -> Fixed:
+        """What pins and partners fix."""
+        return Fixed(self.pinned, self.uv, self.partner)
+
+    def in_frame(self, settings: Settings) -> np.ndarray:
+        """(p,) bool, whether the old UVs hold the new ones."""
+        held = settings.boundary == "KEEP" or ((settings.boundary == "FREE") & self.has_pins)
+        return self.has_uv & held
+
+    def rows(self, pieces: np.ndarray) -> np.ndarray:
+        """(n,) bool, the vertices of the chosen pieces, (p,) bool."""
+        return pieces[self.surface.vertex_piece]
+
+    def rows_of(self, k: int) -> slice:
+        """The vertices of piece k."""
+        return slice(*np.append(self.surface.vertex_starts, len(self.uv))[k : k + 2])
+
+    def of(self, pieces: np.ndarray) -> Batch:
+        """The chosen pieces, (p,) bool, alone."""
+        number, rows = self.surface.numbering(pieces), self.rows(pieces)
+        fixed = self.fixed.of(rows, number)
+        by_piece = (each[pieces] for each in (self.index, self.has_uv, self.mirror))
+        index, has_uv, mirror = by_piece
+        surface = self.surface.of(pieces, number)
+        return Batch(surface, index, fixed.values, has_uv, fixed.held, fixed.partner, mirror)
+
+
+class Batched:
+    """A batch made of shapes.
+
+    Attributes
+    ----------
+    batch : Batch, None where no shape is sound
+    errors : dictionary from the numbers of the others to their errors
+    """
+
+    def __init__(self, shapes: Sequence[Shape], settings: Settings):
+        self.errors: dict[int, UnwrapError] = {}
+        self._sorted: dict[int, locality.Sorted] = {}
+        checked: dict[int, Shape] = {}
+        for k, shape in enumerate(shapes):
+            try:
+                checked[k] = self._checked(k, shape, settings)
+            except UnwrapError as error:
+                self.errors[k] = error
+        self.batch = self._joined(checked, settings)
+
+    def restored(self, k: int, uv: np.ndarray) -> np.ndarray:
+        """Values at the vertices of shape k, (n, ...), in its own order."""
+        return self._sorted[k].restored(uv) if k in self._sorted else uv
+
+    def sorted(self, k: int, values: np.ndarray) -> np.ndarray:
+        """Values at the vertices of shape k, (n, ...), in the batch's order."""
+        return self._sorted[k].sorted(values) if k in self._sorted else values
+
+    def restored_result(self, k: int, result: Result) -> Result:
+        """The result of shape k, in its own order."""
+        return self._sorted[k].restored_result(result) if k in self._sorted else result
+
+    def _checked(self, k, shape, settings):
+        vertices, triangles = checked_arrays(shape.vertices, shape.triangles)
+        n = len(vertices)
+        uv = None if shape.uv is None else checked_uv(n, shape.uv)
+        pinned = checked_pins(n, shape.pinned)
+        if uv is None and settings.boundary == "FREE" and pinned is not None and pinned.any():
+            raise UVError("pins need UVs, and there are none: unpin")
+        if uv is None and settings.initial == "CURRENT":
+            raise UVError("to start from the current UVs there must be some: choose another start")
+        partner = None if shape.partner is None else np.asarray(shape.partner)
+        if partner is not None and not (partner.shape == (n, 2) and ((partner >= 0) & (partner < n)).all()):
+            raise ShapeError(f"partners must be vertices, in the shape ({n}, 2)")
+        if n <= locality.MANY:
+            return Shape(vertices, triangles, uv, pinned, partner)
+        mesh = self._sorted[k] = locality.Sorted(vertices, triangles)
+        partner = None if partner is None else mesh.renumbered(partner)
+        return Shape(mesh.vertices, mesh.triangles, mesh.sorted(uv), mesh.sorted(pinned), partner)
+
+    def _joined(self, shapes, settings):
+        while shapes:
+            meshes = [each.vertices for each in shapes.values()], [each.triangles for each in shapes.values()]
+            vertices, triangles, vertex_starts, triangle_starts = joined(*meshes)
+            topology = Topology(triangles, len(vertices), vertex_starts, triangle_starts)
+            faults = topology.faults()
+            if not faults:
+                vertices, faults = normalised_pieces(vertices, topology)
+            if not faults:
+                return _batch(shapes, Surface.of_topology(vertices, topology), settings)
+            index = list(shapes)
+            for piece, error in faults.items():
+                k = index[piece]
+                if k in self._sorted:
+                    error.triangles = self._sorted[k].own_triangles(np.asarray(error.triangles, dtype=int))
+                self.errors[k] = error
+                del shapes[k]
+        return None
+
+
+def _batch(shapes, surface, settings):
+    n = len(surface.vertices)
+    uv, pinned, partner = np.zeros((n, 2)), np.zeros((n, 2), bool), None
+    has_uv = np.array([shape.uv is not None for shape in shapes.values()])
+    ends = np.append(surface.vertex_starts, n)
+    for k, shape in enumerate(shapes.values()):
+        its = slice(ends[k], ends[k + 1])
+        if shape.uv is not None:
+            uv[its] = shape.uv
+        if shape.pinned is not None:
+            pinned[its] = shape.pinned
+        if shape.partner is not None:
+            if partner is None:
+                partner = np.column_stack([np.arange(n), np.arange(n)])
+            partner[its] = shape.partner + ends[k]
+    batch = Batch(surface, np.array(list(shapes)), uv, has_uv, pinned, partner, np.ones((len(shapes), 2)))
+    # Where the old UVs hold the new ones and are mirrored, unwrap as seen in a mirror.
+    for k in np.flatnonzero(batch.in_frame(settings)):
+        its = uv[batch.rows_of(k)]
+        if enclosed_area(its[outer_loop(surface.one(k), its)]) < 0:
+            batch.mirror[k, 0] = -1
+    batch.uv *= batch.mirror[surface.vertex_piece]
+    return batch
+
+
+def checked_pins(n: int, pinned: np.ndarray | None) -> np.ndarray | None:
+    """Pins as an (n, 2) array of bool, for U and V; raises `PinError`."""
+    if pinned is None:
+        return None
+    pinned = np.asarray(pinned)
+    if pinned.shape not in ((n,), (n, 2)) or pinned.dtype != bool:
+        raise PinError(f"the pins must be True or False for each of the {n} vertices, or for U and V of each")
+    return np.column_stack([pinned, pinned]) if pinned.ndim == 1 else pinned

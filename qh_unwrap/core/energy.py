@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The energy of a map, its density, its values and its derivatives.
+
+The density in a triangle with the stretches s1 and s2 is `a^p b^r`, where `a = (s1/s2 + s2/s1) / 2` measures the angles
+and `b = (s1 s2 + 1 / (s1 s2)) / 2` the areas.  p = r = 1 (balance 0.25) is the symmetric Dirichlet energy.  The quasi-
+harmonic iteration at a balance comes near the map of least energy at that balance, and the refinement goes there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .chart import Chart
+from .domain import Domain
+from .tensor import area_scale, jacobian, jacobian_of
+from .triangles import by_parts, corners_of, hat_gradients, signed_areas
+
+AIR = 0.1  # the air's part of the energy
+_SMALLEST = 1e-9  # eigenvalue of the Hessian of a triangle of unit weight
+
+
+def exponents(balance: float) -> tuple[float, float]:
+    """The powers p and r of the density."""
+    return float(np.clip(4 * balance, 0.05, 1)), min(1.0, 4 / 3 * (1 - balance)) ** 3
+
+
+def density(squares: np.ndarray, det: np.ndarray, balance: float) -> np.ndarray:
+    """`a^p b^r` of triangles with the sum of squared stretches `squares` and the product `det`, (m,)."""
+    p, r = exponents(balance)
+    return (squares / (2 * det)) ** p * ((det + 1 / det) / 2) ** r
+
+
+def map_scale(chart: Chart, uv: np.ndarray) -> np.ndarray:
+    """The scale of every piece's map, (p,): the root of the layout's area by the chart's; never zero."""
+    return np.sqrt(area_scale(chart, jacobian(chart, uv)))
+
+
+def energies(chart: Chart, uv: np.ndarray, balance: float) -> np.ndarray:
+    """The energy of every piece's map, (p,), its mean density at equal areas of chart and layout.
+
+    It is infinite where a triangle is flipped or collapsed; triangles without measure do not count.
+    """
+    G = jacobian(chart, uv)
+    scale = area_scale(chart, G)[chart.piece]
+    (a, b), (c, d) = G
+    det = (a * d - b * c) / scale
+    counts = chart.measure > 0
+    flipped = counts & ~(det > 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        value = density((a * a + b * b + c * c + d * d) / scale, np.where(det > 0, det, 1.0), balance)
+        value = np.where(counts, chart.measure * value, 0)
+    return chart.sums(np.where(flipped, np.inf, value)) / chart.sums(chart.measure)
+
+
+class Barrier:
+    """The energy of maps as a sum over triangles, of which none may flip: the island's, and others' beside it.
+
+    Parameters
+    ----------
+    domain : whose charts count; those of air have the shape at rest that they have in `uv`, and together the part `AIR`
+        of the energy
+    uv : (n, 2), the map that is to be improved
+    balance : as in `Settings`
+    size : (p,), the scale of each piece's map that the energy aims at
+
+    Fields are those of all charts' triangles, one chart after the other.
+    """
+
+    def __init__(self, domain: Domain, uv: np.ndarray, balance: float, size: np.ndarray):
+        self._domain, self._balance = domain, balance
+        everything = domain.triangles
+        self.corners, self._single = everything.corners, len(size) == 1
+        self._hats, self._weight = np.empty((2, 2, self.corners.shape[1])), np.empty(self.corners.shape[1])
+        solid = [(chart, part) for chart, part in everything if not chart.is_air]
+        air = [(chart, part) for chart, part in everything if chart.is_air]
+        total = sum(chart.sums(chart.barrier) for chart, _ in solid)
+        for chart, part in solid:
+            np.divide(chart.hats, self._at(size, chart), out=self._hats[..., part])
+            np.divide(chart.barrier, self._at(total, chart), out=self._weight[part])
+        for chart, part in air:
+            self._hats[..., part] = hat_gradients(chart.shapes(uv))
+            self._weight[part] = 0
+        # A face without area in space that lies folded over bars nothing: nothing could be done about it.
+        self._void = None
+        for chart, part in solid:
+            folded = (chart.measure == 0) & ~(signed_areas(corners_of(uv, chart.triangles)) > 0)
+            if folded.any():
+                self._void = np.zeros(len(self._weight), bool) if self._void is None else self._void
+                self._void[part] = folded
+                self._weight[part][folded] = 0
+        if air:
+            value = self.value(self.jacobian(uv))
+            value = np.where(np.isfinite(value), value, 1.0)  # else the map is given up anyway
+            counts = sum(chart.sums(chart.barrier) for chart, _ in air)
+            for chart, part in air:
+                self._weight[part] = chart.barrier * self._at(AIR * value / np.maximum(counts, 1), chart)
+
+    def _at(self, values, chart):
+        """The values (p,) of the pieces at a chart's triangles, (m,), or the one that there is."""
+        return values[0] if self._single else values[chart.piece]
+
+    @property
+    def least(self) -> np.ndarray:
+        """Its least possible value, where every triangle keeps its shape, (p,)."""
+        return self._domain.triangles.sums(self._weight)
+
+    def jacobian(self, uv: np.ndarray) -> np.ndarray:
+        """The map's derivative in every triangle, (2, 2, m)."""
+        return jacobian_of(self.corners, self._hats, uv)
+
+    def value(self, jacobian: np.ndarray) -> np.ndarray:
+        """Of each piece, (p,), infinite where a triangle is flipped."""
+        (a, b), (c, d) = jacobian
+        det = a * d - b * c
+        flipped = ~(det > 0)
+        det = np.where(flipped, 1.0, det)
+        with np.errstate(over="ignore"):
+            value = self._weight * density(a * a + b * b + c * c + d * d, det, self._balance)
+        if flipped.any():
+            value[flipped & (self._weight > 0)] = np.inf
+        return self._domain.triangles.sums(value)
+
+    def longest_step(self, jacobian: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """The smallest positive step of each piece at which a triangle collapses, (p,), or some 1e300."""
+        (a, b), (c, d) = jacobian
+        (e, f), (g, h) = change
+        d0, d1, d2 = a * d - b * c, a * h + d * e - b * g - c * f, e * h - f * g
+        # d0 + d1 t + d2 t^2 = 0; d0 is positive.  In 1 / t the smallest positive t is the largest root.
+        discriminant = d1 * d1 - 4 * d0 * d2
+        root = np.sqrt(np.maximum(discriminant, 0))
+        root -= d1
+        if self._void is not None:
+            d0 = np.where(self._void, 1.0, d0)
+            discriminant[self._void] = -1
+        root /= 2 * d0
+        root[discriminant < 0] = 0
+        return 1 / np.maximum(self._domain.triangles.largest(root), 1e-300)
+
+    def derivatives(self, jacobian: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The gradient by the corners' u and v, and the Hessian's blocks of the corners c and c + 1: (3, m) each.
+
+        Four parts (mean, difference, symmetric, antisymmetric) make up the blocks [[m + d, s - a], [s + a, m - d]].
+        Every triangle's part is made positive by its analytic eigenvalues (Smith, de Goes, Kim 2019).
+        """
+        if self._void is not None:
+            jacobian = np.where(self._void, np.eye(2)[:, :, None], jacobian)
+        return by_parts(
+            lambda jacobian, hats, weight: _derivatives(jacobian, hats, weight, self._balance),
+            jacobian,
+            self._hats,
+            self._weight,
+        )
+
+
+def _derivatives(jacobian, hats, weight, balance):
+    p, r = exponents(balance)
+    (a, b), (c, d) = jacobian
+    # Singular values in closed form, and the angles of the singular vectors
+    turn, shear = np.arctan2(c - b, a + d), np.arctan2(c + b, a - d)
+    left, right = (turn + shear) / 2, (turn - shear) / 2
+    s1 = (np.hypot(a + d, c - b) + np.hypot(a - d, c + b)) / 2
+    det = a * d - b * c
+    s2 = det / s1
+    size, square = s1 * s1 + s2 * s2, det * det
+    beta, gamma = (square - 1) / (square + 1), 4 * square / (square + 1) ** 2
+
+    value = weight * density(size, det, balance)
+    g1 = p * (2 * s1 / size - 1 / s1) + r * beta / s1  # logarithmic derivatives
+    g2 = p * (2 * s2 / size - 1 / s2) + r * beta / s2
+    f11 = g1 * g1 + p * (2 / size - 4 * (s1 / size) ** 2 + 1 / s1**2) + r * (gamma - beta) / s1**2
+    f22 = g2 * g2 + p * (2 / size - 4 * (s2 / size) ** 2 + 1 / s2**2) + r * (gamma - beta) / s2**2
+    f12 = g1 * g2 - 4 * p * det / size**2 + r * gamma / det
+    gap = s1 - s2
+    flip = np.where(gap > 1e-6 * s1, (g1 - g2) / np.where(gap > 0, gap, 1), f11 - f12)
+    twist = (g1 + g2) / (s1 + s2)
+    f11, f12, f22 = _positive(f11, f12, f22)
+    flip, twist = np.maximum(flip, _SMALLEST), np.maximum(twist, _SMALLEST)
+    both, skew = (flip + twist) / 2, (flip - twist) / 2
+
+    # The hats' gradients along the right singular vectors: h of the corners, k of the next ones
+    cos, sin = np.cos(right), np.sin(right)
+    x, y = hats[:, 0], hats[:, 1]
+    h1, h2 = _with_first(x * cos - y * sin), _with_first(x * sin + y * cos)
+    k1, k2 = np.roll(h1, -1, axis=0), np.roll(h2, -1, axis=0)
+    cos, sin = np.cos(left), np.sin(left)
+    along, across = value * g1 * h1, value * g2 * h2
+    gradient = cos * along - sin * across, sin * along + cos * across
+
+    # The blocks in the frame of the left singular vectors; turned, only the second and third row change
+    long, short = value / 2 * h1 * k1, value / 2 * h2 * k2
+    one, other = value / 2 * h1 * k2, value / 2 * h2 * k1
+    difference = (f11 - both) * long - (f22 - both) * short
+    symmetric = (f12 + skew) * (one + other)
+    cos, sin = np.cos(2 * left), np.sin(2 * left)
+    return (
+        *gradient,
+        (f11 + both) * long + (f22 + both) * short,
+        difference * cos - symmetric * sin,
+        difference * sin + symmetric * cos,
+        (f12 - skew) * (other - one),
+    )
+
+
+def _with_first(hats):
+    # The gradients (2, m) of the second and third corners' hats, and before them the first's: all three sum to zero.
+    return np.array([-hats[0] - hats[1], *hats])
+
+
+def _positive(a, b, c):
+    """The symmetric matrices [[a, b], [b, c]] with their eigenvalues raised to the least one."""
+    mean, half = (a + c) / 2, (a - c) / 2
+    radius = np.hypot(half, b)
+    high, low = np.maximum(mean + radius, _SMALLEST), np.maximum(mean - radius, _SMALLEST)
+    radius = np.maximum(radius, np.finfo(float).tiny)
+    middle, spread = (high + low) / 2, (high - low) / 2
+    return middle + spread * half / radius, spread * b / radius, middle - spread * half / radius

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What goes into an unwrap and what comes out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .distortion import Distortion
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """An island to unwrap.
+
+    vertices   (n, 3), any unit
+    triangles  (m, 3), consistently wound; one piece, manifold, with a boundary and without handles
+    uv         (n, 2), its current UVs: needed for pins, to keep the boundary or to start from them, else only measured
+    pinned     (n,) bool, or (n, 2) for U and V: what stays where `uv` has it (boundary FREE or KEEP), or four corners
+               (RECTANGLE)
+    partner    (n, 2) int, for U and V of every vertex the vertex that it keeps its distance from, itself for nobody
+               (boundary FREE or KEEP, with `uv`)
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    uv: np.ndarray | None = None
+    pinned: np.ndarray | None = None
+    partner: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The map of an island after a step."""
+
+    iteration: int
+    """0 for the initial map."""
+    uv: np.ndarray = field(repr=False)
+    """(n, 2)"""
+    change: float
+    """The largest movement of a vertex by the layout's diameter; infinite for the initial map."""
+    valid: bool
+    """No triangle, air included, is flipped or collapsed in 32-bit floats."""
+    converged: bool
+    """No vertex moved by more than the tolerance, and none was held back; or a further refinement would not pay."""
+    repaired: bool
+    """Weights had to be changed, in this step or an earlier one, to turn flipped triangles back."""
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What an unwrap did."""
+
+    before: Distortion | None
+    """Of the UVs that were given, if any."""
+    initial: Distortion
+    """Of the initial map."""
+    after: Distortion
+    """Of the result."""
+    iterations: int
+    """Those of the refinement included."""
+    converged: bool
+    """The last iteration moved no vertex by more than the tolerance, or the refinement no longer paid."""
+    changes: tuple[float, ...]
+    """For every iteration, the largest movement of a vertex by the layout's diameter."""
+    injective: bool
+    """Certified in 32-bit floats: no triangle is flipped and no two overlap."""
+    mirrored: bool
+    """The given UVs were mirrored and the result is too; flips are counted the other way round."""
+    warnings: tuple[str, ...]
+
+    def to_dict(self) -> dict:
+        """As plain numbers, lists and dictionaries, without the arrays over triangles."""
+        names = ("iterations", "converged", "injective", "mirrored")
+        return {
+            "before": self.before and self.before.to_dict(),
+            "initial": self.initial.to_dict(),
+            "after": self.after.to_dict(),
+            **{name: getattr(self, name) for name in names},
+            "changes": list(self.changes),
+            "warnings": list(self.warnings),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """New UVs (n, 2), the report on them, and the surface's boundary loops, the outline first."""
+
+    uv: np.ndarray = field(repr=False)
+    report: Report
+    loops: list = field(repr=False)
+
+
+def face_warnings(flat: int) -> tuple[str, ...]:
+    """What to say of so many faces without area."""
+    return (f"{flat} {'face has' if flat == 1 else 'faces have'} zero area",) if flat else ()

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which map to begin with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from .boundary import held_outlines
+from .certificate import certified_pieces, wrong_pieces
+from .chart import Surface
+from .domain import Fixed, Held
+from .energy import energies
+from .initial import conformal, fit, project, weighted_map
+from .settings import Settings
+from .triangles import corners_of, signed_areas
+
+# The starts to choose from, the cheapest first, and the energy that needs no further one
+_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "MEAN_VALUE": np.inf}
+
+
+def natural_start(surface: Surface, settings: Settings, initial: str) -> np.ndarray:
+    """The map `initial` (n, 2) of every piece as it is, or within a circle where it needs a boundary."""
+    if initial == "CONFORMAL":
+        return conformal(surface)
+    if initial == "PROJECTION":
+        return project(surface)
+    n = len(surface.vertices)
+    nothing = np.zeros(surface.piece_count, bool)
+    circle = replace(settings, boundary="CIRCLE", weights="COTANGENT")
+    held, values, _, faults = held_outlines(surface, circle, np.zeros((n, 2)), nothing, np.zeros((n, 2), bool))
+    for fault in faults.values():
+        raise fault
+    return weighted_map(Held(surface, Fixed(held, values), surface.plugs(solid=True)), initial)[:n]
+
+
+def best_start(surface: Surface, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    """Of the certified natural maps of every piece a good one, or that of least energy; if there is none, the last.
+
+    Returns the map (n, 2), and for which pieces (p,) it is certified.
+    """
+    n = len(surface.vertices)
+    start, least = np.zeros((n, 2)), np.full(surface.piece_count, np.inf)
+    open_pieces = np.ones(surface.piece_count, bool)
+    for initial, enough in _CANDIDATES.items():
+        whole = open_pieces.all()
+        part = surface if whole else surface.of(open_pieces)
+        uv = natural_start(part, settings, initial)
+        value = energies(part, uv, settings.balance)
+        better = value < least[open_pieces]
+        if better.any():
+            better &= certified_pieces(part, uv)
+        pieces = np.flatnonzero(open_pieces)
+        least[pieces[better]] = value[better]
+        # The last serves where none is certified.
+        taken = better | ~np.isfinite(least[open_pieces])
+        rows = np.flatnonzero(open_pieces[surface.vertex_piece])
+        its = taken[part.vertex_piece]
+        start[rows[its]] = uv[its]
+        open_pieces &= ~(least < enough)
+        if not open_pieces.any():
+            break
+    return start, np.isfinite(least)
+
+
+def with_pins(surface: Surface, start: np.ndarray, uv: np.ndarray, pinned: np.ndarray) -> np.ndarray:
+    """The map `start` (n, 2) moved, turned and scaled so that the pins lie as near as can be to where `uv` has them,
+    and then put there.
+
+    pinned  (n, 2) bool, for U and V
+    """
+    result = start.copy()
+    ends = np.append(surface.vertex_starts, len(uv))
+    some = pinned.any(axis=1)
+    for k in np.unique(surface.vertex_piece[some]):
+        its = slice(ends[k], ends[k + 1])
+        chosen = some[its]
+        if (uv[its][chosen] == uv[its][chosen][0]).all():  # one place tells neither size nor turn
+            fitted = fit(start[its], np.ones(len(chosen), bool), uv[its])
+            triangles = surface.triangles[surface.piece == k] - ends[k]
+            area, old = (np.abs(signed_areas(corners_of(each, triangles))).sum() for each in (fitted, uv[its]))
+            if area > 0 and old > 0:
+                fitted *= np.sqrt(old / area)
+            fitted += (uv[its] - fitted)[chosen].mean(axis=0)
+        else:
+            fitted = fit(start[its], chosen, uv[its])
+        result[its] = np.where(pinned[its], uv[its], fitted)
+    return result
+
+
+def start_within(
+    domain: Held, settings: Settings, uv: np.ndarray, has_uv: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """The initial map (n, 2) of a domain whose outlines are held, with what is held in its place.
+
+    uv      (n', 2), the island's, of the pieces that have some, (p,) bool in `has_uv`
+    values  (n', 2), where the held ones are
+    """
+    surface, initial = domain.island, settings.initial
+    current = np.full(surface.piece_count, initial == "CURRENT")
+    if initial == "AUTO":
+        initial = "MEAN_VALUE"
+        if settings.boundary == "KEEP":
+            current = has_uv & ~wrong_pieces([surface], uv)
+    if initial in ("CURRENT", "PROJECTION", "CONFORMAL"):
+        start = uv if initial == "CURRENT" else natural_start(surface, settings, initial)
+        held = domain.constrained.held[: len(uv)]
+        start = domain.start(_fitted(surface, start, held, values))
+    else:
+        # Holes are closed meanwhile, so that nothing folds over them.
+        fixed = Fixed(domain.constrained.held[: len(uv)], values)
+        solid = domain if domain.is_solid else Held(surface, fixed, surface.plugs(solid=True))
+        start = weighted_map(solid, initial)
+    if current.any() and initial != "CURRENT":
+        start = np.where(current[domain.vertex_piece][:, None], domain.start(uv), start)
+    return start
+
+
+def _fitted(surface, uv, held, values):
+    """Every piece's map brought by a similarity, maybe mirrored, near to where what is held is, and that put there."""
+    result = np.empty_like(uv)
+    ends = np.append(surface.vertex_starts, len(uv))
+    for first, end in pairwise(ends):
+        its = slice(first, end)
+        fitted = fit(uv[its], held[its].all(axis=1), values[its], mirror=True)
+        result[its] = np.where(held[its], values[its], fitted)
+    return result
