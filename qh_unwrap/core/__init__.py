@@ -7,7 +7,7 @@
 from .chart import Surface
 from .distortion import Distortion, distortion
 from .errors import UnwrapError
-from .refinement import has_positive_weights, refine_obtuse
+from .obtuse import has_positive_weights, refine_obtuse
 from .report import Report, Result, Shape, State
 from .session import Unwrapper
 from .settings import Settings
