@@ -6,25 +6,30 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from .certificate import count_crossings, enclosed_area
+from .chart import Surface, edge_lengths
 from .errors import BoundaryError, PinError, UnwrapError, UVError
 from .initial import project
-from .chart import Surface, edge_lengths
-from .certificate import count_crossings, enclosed_area
+from .settings import Settings
 
-_BOW = 0.02  # how far a side bulges, by its length, where it must not be straight
-_CORNER_CANDIDATES = 40
+_BOW = 0.02  # how far a side bulges, relative to its length, where it must not be straight
+_CORNER_CANDIDATES = 40  # vertices of the outline, from which the corners of a rectangle are chosen
+_AROUND = 0.015  # distance along the outline, relative to its length, within which its bends count as one corner
 
 
-def held_outlines(surface: Surface, settings, uv, has_uv, pinned):
-    """What `held_vertices` says of every piece of a surface, and the errors.
+def held_outlines(
+    surface: Surface, settings: Settings, uv: np.ndarray, has_uv: np.ndarray, pinned: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, list[tuple[str, ...]], dict[int, UnwrapError]]:
+    """What is held of every piece of a surface, for U and V, (n, 2) bool, and where, (n, 2), as `held_vertices` says.
+
+    Also returns for each piece a tuple of warnings, and a dictionary from pieces to their errors.
 
     uv      (n, 2), of the pieces that have some, (p,) bool in `has_uv`
     pinned  (n, 2) bool, for U and V
-
-    Returns (n, 2) bool, (n, 2), for each piece a tuple of warnings, and a dictionary from pieces to errors.
     """
     held, values = np.zeros(len(uv), bool), np.zeros((len(uv), 2))
-    warnings, faults = [()] * surface.piece_count, {}
+    warnings: list[tuple[str, ...]] = [()] * surface.piece_count
+    faults: dict[int, UnwrapError] = {}
     ends = np.append(surface.vertex_starts, len(uv))
     some = pinned.any(axis=1)
     for k in range(surface.piece_count):
@@ -40,12 +45,15 @@ def held_outlines(surface: Surface, settings, uv, has_uv, pinned):
     return (held | pinned if settings.boundary == "KEEP" else held), values, warnings, faults
 
 
-def held_vertices(surface, settings, uv=None, pinned=None):
-    """The vertices whose place is given, and where that is: (n,) bool and (n, 2), and a tuple of warnings.
+def held_vertices(
+    surface: Surface, settings: Settings, uv: np.ndarray | None = None, pinned: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """The vertices of a surface of one piece whose place is given, (n,) bool, where it is, (n, 2), and warnings.
 
+    `uv` (n, 2) are the UVs that it has, `pinned` (n,) bool its pinned vertices.
     Raises `UVError`, `PinError` or `BoundaryError` where the settings cannot be followed.
     """
-    warnings = ()
+    warnings: tuple[str, ...] = ()
     loop = surface.loops[0]
     if settings.boundary in ("CIRCLE", "OUTLINE") and pinned is not None and pinned.any():
         raise PinError("pins need the boundary FREE or KEEP: unpin, or choose one of these")
@@ -72,20 +80,24 @@ def held_vertices(surface, settings, uv=None, pinned=None):
 
 
 def _circle(points):
-    # By arc length, from the vertex farthest from the middle: independent of how the vertices are numbered.
+    """Places on a circle, (k, 2), by the arc lengths of the closed polygon (k, 3).
+
+    They start with the vertex farthest from the middle, so that it does not matter how the vertices are numbered.
+    """
     first = int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))
     angle = 2 * np.pi * np.roll(_fractions(np.roll(points, -first, axis=0)), first)
     return 0.5 + 0.5 * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def _fractions(points):
-    # Where along the closed polygon each point lies, from 0 for the first to less than 1; no two in one place
+    """Where along a closed polygon its points lie, (k,), from 0 for the first to less than 1; no two in one place."""
     length = edge_lengths(points)
     length = np.maximum(length, 1e-3 * length.mean())
     return np.concatenate([[0.0], np.cumsum(length)[:-1]]) / length.sum()
 
 
 def _rectangle(surface, aspect, pinned):
+    """The corners (4, 2) of the rectangle, and what `_along_sides` says of it."""
     loop = surface.loops[0]
     if len(loop) < 4:
         raise BoundaryError("a rectangle needs an outline of at least four vertices: choose another boundary")
@@ -103,7 +115,10 @@ def _rectangle(surface, aspect, pinned):
 
 
 def _along_sides(surface, corners):
-    """Which side each outline vertex lies on, and how far along it by arc length (0 at the first corner)."""
+    """The side that each outline vertex lies on, (k,), and how far along it by arc length, (k,), from 0 to less than 1.
+
+    `corners` are the places in the outer loop where the sides begin.
+    """
     loop = surface.loops[0]
     order = np.roll(np.arange(len(loop)), -corners[0])
     at = _fractions(surface.vertices[loop[order]])
@@ -116,6 +131,7 @@ def _along_sides(surface, corners):
 
 
 def _pinned_corners(loop, pinned):
+    """The four places in the outer loop that are pinned; raises `PinError` if these are not all the pins."""
     corners = np.flatnonzero(pinned[loop])
     if len(corners) != 4 or pinned.sum() != 4:
         raise PinError(
@@ -126,24 +142,24 @@ def _pinned_corners(loop, pinned):
 
 
 def _chosen_corners(surface, aspect):
-    """Four places in the outer loop that turn sharply and cut it into sides that suit the rectangle."""
+    """Four places in the outer loop where it bends sharply, and that cut it into sides that suit the rectangle."""
     loop = surface.loops[0]
     at = _fractions(surface.vertices[loop])
-    turn = np.pi - surface.angle_sums(len(surface.vertices))[loop]
-    # What the outline turns within 1.5 % of its length on either side, the vertex itself counting double
-    total = np.concatenate([[0.0], np.cumsum(np.tile(turn, 3))])
-    around = np.concatenate([at - 1, at, at + 1])
-    window = 0.015
-    turning = turn + total[np.searchsorted(around, at + window, "right")] - total[np.searchsorted(around, at - window)]
+    bend = np.pi - surface.angle_sums(len(surface.vertices))[loop]  # in radians, positive at convex vertices
+    # How sharp a corner is: the sum of the bends at and around the vertex, that of the vertex itself counting double
+    total = np.concatenate([[0.0], np.cumsum(np.tile(bend, 3))])
+    places = np.concatenate([at - 1, at, at + 1])
+    within = np.searchsorted(places, at - _AROUND), np.searchsorted(places, at + _AROUND, "right")
+    sharpness = bend + total[within[1]] - total[within[0]]
     candidates = []
-    for place in np.argsort(-turning, kind="stable"):
+    for place in np.argsort(-sharpness, kind="stable"):
         gap = np.abs(at[candidates] - at[place]) if candidates else np.ones(1)
         if np.minimum(gap, 1 - gap).min() >= 1 / (2 * _CORNER_CANDIDATES):
             candidates.append(place)
         if len(candidates) == _CORNER_CANDIDATES:
             break
     if len(candidates) < 4:
-        candidates = np.argsort(-turning, kind="stable")[:4]
+        candidates = np.argsort(-sharpness, kind="stable")[:4]
     sets = np.array(list(combinations(np.sort(candidates), 4)))
     share = np.diff(at[sets], axis=1, append=at[sets[:, :1]] + 1)
     uneven = (share[:, 0] - share[:, 2]) ** 2 + (share[:, 1] - share[:, 3]) ** 2
@@ -151,18 +167,19 @@ def _chosen_corners(surface, aspect):
         wanted = aspect / (1 + aspect)
         across = share[:, 0] + share[:, 2]
         uneven += np.minimum((across - wanted) ** 2, (1 - across - wanted) ** 2)
-    sharp = np.minimum(turning[sets], np.pi).sum(axis=1)
+    sharp = np.minimum(sharpness[sets], np.pi).sum(axis=1)
     return sets[np.argmax(sharp - 20 * uneven)]
 
 
 def _hull(surface):
+    """The corners (c, 2) of the convex hull of the outline's flat view, and the side that each outline vertex goes to
+    and how far along it, as `_along_sides` returns them."""
     loop = surface.loops[0]
     flat = project(surface)[loop]
     try:
         corners = ConvexHull(flat).vertices
     except QhullError:
         raise BoundaryError("the outline's flat view is a line: choose another boundary") from None
-    polygon = flat[corners]
     corners = np.roll(corners, -int(np.argmin(corners)))
     polygon = flat[corners]
     if (np.diff(corners) > 0).all():
@@ -188,9 +205,10 @@ def _hull(surface):
 
 
 def _on_polygon(surface, polygon, side, along):
-    """Places on a convex polygon (k, 2), and how many of its sides had to be bowed.
+    """The places of the outline on a convex polygon (c, 2), (k, 2), and how many of its sides had to be bowed.
 
-    Where an inner edge joins two vertices of a straight side, its triangle would collapse.
+    `side` and `along` (k,) say which side each outline vertex lies on and how far along it.  A side is bowed where an
+    inner edge joins two of its vertices: on a straight side, triangles at that edge would collapse.
     """
     start, end = polygon, np.roll(polygon, -1, axis=0)
     position = np.full(len(surface.vertices), -1)
@@ -210,7 +228,7 @@ def _on_polygon(surface, polygon, side, along):
 
 
 def _kept(surface, uv, pinned):
-    """Hold every boundary loop, and the pins."""
+    """The vertices of all boundary loops, and those that are pinned, (n,) bool; raises `BoundaryError`."""
     held = np.zeros(len(surface.vertices), bool)
     for loop in surface.loops:
         held[loop] = True
@@ -225,6 +243,6 @@ def _kept(surface, uv, pinned):
     return held if pinned is None else held | pinned
 
 
-def outer_loop(surface, uv):
+def outer_loop(surface: Surface, uv: np.ndarray) -> np.ndarray:
     """The loop that encloses the largest area in the plane."""
     return max(surface.loops, key=lambda loop: abs(enclosed_area(uv[loop])))

@@ -4,22 +4,30 @@
 It speaks of the 32-bit floats that Blender stores.  Whoever certifies what Blender draws passes Blender's triangles.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .triangles import by_parts, corners_of
 
-_PORTION = 1_000_000  # pairs at a time
+if TYPE_CHECKING:
+    from .chart import Chart, Surface
+
+_PORTION = 1_000_000  # pairs of boxes that are looked at together, about: it bounds the memory
 
 
-def turn(a, b, c):
-    """1 where the points a, b, c (n, 2) turn left, -1 where they turn right, 0 where they lie on a line: exactly."""
+def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """1 where the way over the points a, b, c (n, 2) turns left, -1 where right, 0 where they lie on a line: exactly,
+    (n,)."""
     (bx, by), (cx, cy) = (b - a).T, (c - a).T
     first, second = bx * cy, by * cx
     apart = first - second
     result = np.sign(apart).astype(np.int8)
-    # Where the two nearly cancel, rounding decides (Shewchuk 1997 bounds the error): then look closer.
+    # Where the two products nearly cancel, rounding decides (Shewchuk 1997 bounds the error): then look closer.
     close = np.abs(apart) <= 1e-15 * (np.abs(first) + np.abs(second))
     close = np.flatnonzero(close & (first != 0) & (second != 0))
     if len(close):
@@ -28,6 +36,7 @@ def turn(a, b, c):
 
 
 def _exact_turn(a, b, c):
+    """As `turn`, which calls it for the few points where ordinary arithmetic does not suffice."""
     (bx, by), (cx, cy) = (b - a).T, (c - a).T
     first, second = bx * cy, by * cx
     # Rounding keeps the order of numbers: the exact products differ as the rounded ones do, or else as their errors.
@@ -41,31 +50,31 @@ def _exact_turn(a, b, c):
 
 
 def _error(x, y):
-    # What the product x * y loses by rounding, exactly (Dekker 1971).
+    """What the product x * y loses by rounding, exactly (Dekker 1971)."""
     (x1, x2), (y1, y2) = (_halves(x), _halves(y))
     return x1 * y1 - x * y + x1 * y2 + x2 * y1 + x2 * y2
 
 
 def _halves(x):
-    # The upper and the lower half of the digits.
+    """Two numbers with half the digits each, whose sum is x."""
     scaled = 134217729 * x  # 2^27 + 1
     upper = scaled - (scaled - x)
     return upper, x - upper
 
 
-def as_stored(uv):
+def as_stored(uv: np.ndarray) -> np.ndarray:
     """`uv` rounded to the 32-bit floats that Blender keeps."""
     with np.errstate(over="ignore"):
         return np.asarray(uv).astype(np.float32).astype(np.float64)
 
 
-def orientation(uv, triangles):
+def orientation(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """1 for triangles that follow their winding, -1 for flipped, 0 for collapsed ones, (m,), in 32-bit floats."""
     stored = np.asfortranarray(as_stored(uv))
-    return by_parts(lambda corner: turn(*corners_of(stored, corner.T).swapaxes(0, 1)), triangles.T)
+    return by_parts(lambda part: turn(*corners_of(stored, part.T).swapaxes(0, 1)), triangles.T)
 
 
-def is_injective(uv, triangles, loops):
+def is_injective(uv: np.ndarray, triangles: np.ndarray, loops: Sequence[np.ndarray]) -> bool:
     """Whether no two points of the surface share a place in 32-bit floats: a certificate, not an estimate.
 
     If every triangle follows its winding, a place is covered as often as the boundary `loops` wind around it; and that
@@ -74,8 +83,11 @@ def is_injective(uv, triangles, loops):
     return bool(are_injective(uv, triangles, np.zeros(len(triangles), int), loops, np.zeros(len(loops), int))[0])
 
 
-def are_injective(uv, triangles, piece, loops, loop_piece):
-    """The same for several pieces, (p,) bool; `piece` (m,) and `loop_piece` (l,) say whose a triangle or loop is."""
+def are_injective(
+    uv: np.ndarray, triangles: np.ndarray, piece: np.ndarray, loops: Sequence[np.ndarray], loop_piece: np.ndarray
+) -> np.ndarray:
+    """The same for each of several pieces, (p,) bool; `piece` (m,) and `loop_piece` (l,) say whose a triangle or loop
+    is.  No piece is compared with another."""
     wrong = np.zeros(loop_piece.max() + 1, bool)
     wrong[piece[orientation(uv, triangles) <= 0]] = True
     if wrong.all():
@@ -87,10 +99,10 @@ def are_injective(uv, triangles, piece, loops, loop_piece):
     return ~wrong & (crossings(polygons, loop_piece, touching=True) == 0)
 
 
-def certified_pieces(surface, uv):
-    """Whether the map `uv` (n, 2) of every piece of a surface is certified, (p,) bool.
+def certified_pieces(surface: Surface, uv: np.ndarray) -> np.ndarray:
+    """Whether the map `uv` (n, 2) is certified as injective, for every piece of a surface, (p,) bool.
 
-    Triangles without area on the surface count only if they are flipped.
+    Triangles without area on the surface are left out where they have none in the map either.
     """
     counts = surface.measure > 0
     if counts.all():
@@ -102,12 +114,12 @@ def certified_pieces(surface, uv):
     return are_injective(uv, triangles, piece, surface.loops, surface.loop_piece)
 
 
-def enclosed_area(points):
+def enclosed_area(points: np.ndarray) -> float:
     """Signed area within the closed polygon (n, 2), positive counter-clockwise."""
     return enclosed_areas([points])[0]
 
 
-def enclosed_areas(polygons):
+def enclosed_areas(polygons: Sequence[np.ndarray]) -> np.ndarray:
     """The same of every polygon, (k,)."""
     start, following, first = _sides(polygons)
     origin = np.repeat(start[first], np.diff(first, append=len(start)), axis=0)
@@ -116,7 +128,8 @@ def enclosed_areas(polygons):
 
 
 def _sides(polygons):
-    """Where the closed polygons' sides start (n, 2), the numbers of those that follow, and of each polygon's first."""
+    """Where the sides of all closed polygons start, (n, 2), the number of the side that follows each, (n,), and that of
+    each polygon's first side, (k,)."""
     size = np.array([len(points) for points in polygons])
     first = np.cumsum(size) - size
     following = np.arange(1, size.sum() + 1)
@@ -124,13 +137,13 @@ def _sides(polygons):
     return np.concatenate(polygons), following, first
 
 
-def count_crossings(polygons, touching=False):
+def count_crossings(polygons: Sequence[np.ndarray], touching: bool = False) -> int:
     """How many pairs of sides of the closed polygons, each (n, 2), properly cross, or also touch, exactly."""
     return int(crossings(polygons, np.zeros(len(polygons), int), touching)[0])
 
 
-def crossings(polygons, group, touching=False):
-    """The same within every group of polygons; `group` (k,) numbers that of each polygon."""
+def crossings(polygons: Sequence[np.ndarray], group: np.ndarray, touching: bool = False) -> np.ndarray:
+    """The same for every group of polygons, (g,); `group` (k,) is the number of each polygon's group."""
     start, following, first = _sides(polygons)
     end = start[following]
     group = np.repeat(group, np.diff(first, append=len(start)))
@@ -145,21 +158,24 @@ def crossings(polygons, group, touching=False):
         else:
             crossing = (across < 0) & (back < 0)
         found += np.bincount(group[one[crossing]], minlength=len(found))
-    if touching:  # and sides that turn back on the one before
+    if touching:  # and sides that run back over the one before
         back = end - start, end[following] - end
         on_a_line = turn(start, end, end[following]) == 0
         found += np.bincount(group[on_a_line & ((back[0] * back[1]).sum(axis=1) <= 0)], minlength=len(found))
     return found
 
 
-def near_boxes(low, high, group):
-    """The pairs (k,), (k,) of boxes `low` to `high` (n, 2), both of one group, that meet or touch; some at a time."""
+def near_boxes(low: np.ndarray, high: np.ndarray, group: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the pairs of boxes that meet or touch and are of one group, as two arrays of numbers (k,), some at a time.
+
+    Boxes reach from `low` to `high`, (n, 2) each, and belong to the groups `group` (n,).  They are sorted by where they
+    begin along one axis: a box can only meet those after it that begin before it ends.  To sort all groups at once,
+    each is moved along that axis so far that none reaches the next.
+    """
     axis = int(np.argmax(np.ptp(low, axis=0)))
-    # Laid end to end, the groups lie apart by more than rounding can close.
     apart = 2 * (np.ptp(np.vstack([low, high])[:, axis]) + 1e-30)
-    begin, close = low[:, axis] + apart * group, high[:, axis] + apart * (group + 1e-9)
+    begin, close = low[:, axis] + apart * group, high[:, axis] + apart * (group + 1e-9)  # more than rounding takes
     order = np.argsort(begin, kind="stable")
-    # Sorted by where they begin, each is near its followers as long as those begin before it ends.
     count = np.searchsorted(begin[order], close[order], side="right") - np.arange(len(order)) - 1
     for part in np.array_split(np.arange(len(order)), 1 + count.sum() // _PORTION):
         total = np.cumsum(count[part])
@@ -170,12 +186,12 @@ def near_boxes(low, high, group):
         yield one[near], other[near]
 
 
-def wrong_triangles(chart, uv):
+def wrong_triangles(chart: Chart, uv: np.ndarray) -> np.ndarray:
     """The triangles of a chart that are not positive though they could be, (m,) bool, in 32-bit floats."""
     return (orientation(uv, chart.triangles) <= 0) & (chart.measure > 0)
 
 
-def wrong_pieces(charts, uv):
+def wrong_pieces(charts: Sequence[Chart], uv: np.ndarray) -> np.ndarray:
     """The pieces of which a triangle, in any of the charts, is not positive though it could be, (p,) bool."""
     wrong = np.zeros(charts[0].piece_count, bool)
     for chart in charts:

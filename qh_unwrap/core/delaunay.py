@@ -5,40 +5,43 @@ Qhull triangulates the points, and then sides that are missing are put in one af
 checked without rounding: it is the whole convex hull, covered once.
 """
 
+from __future__ import annotations
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay, QhullError
 
 from .certificate import turn
 
-_JOGGLE = 1e-11  # of the size: for many points on one circle Qhull takes half as long again
-_ROUNDING = 1e-15  # of the terms of a turn (Shewchuk 1997, with a margin)
-_CIRCLE_ROUNDING = 1.2e-15  # of the terms of a test for a circle
+_JOGGLE = 1e-11  # how far Qhull's points are moved, relative to their extent: many on one circle would take it longer
+_ROUNDING = 1e-15  # largest rounding error of `turn`, relative to its terms (Shewchuk 1997, with a margin)
+_CIRCLE_ROUNDING = 1.2e-15  # largest rounding error of `_in_circle`, relative to its terms
 
 
-def triangulate(points, sides):
+def triangulate(points: ArrayLike, sides: ArrayLike) -> np.ndarray | None:
     """The constrained Delaunay triangulation of the points (p, 2), which contains all `sides` (s, 2), pairs of points.
 
     Returns triangles (t, 3) that fill the convex hull of exactly these points, all counter-clockwise in exact
     arithmetic.  Returns None where there are none such: points coincide or all lie on a line, sides cross, or a point
     lies on a side.  How near the triangles are to Delaunay's is up to rounding.
     """
-    points, sides = _scaled(np.asarray(points, dtype=float)), np.asarray(sides, dtype=np.int64).reshape(-1, 2)
-    if points is None:
+    scaled, sides = _scaled(np.asarray(points, dtype=float)), np.asarray(sides, dtype=np.int64).reshape(-1, 2)
+    if scaled is None:
         return None
-    triangles, edges = _triangulated(points)
+    triangles, edges = _triangulated(scaled)
     if triangles is None:
         return None
     missing = ~edges.contain(sides)
     if not missing.any():
         return triangles
-    mesh = _Mesh(points, triangles, edges)
+    mesh = _Mesh(scaled, triangles, edges)
     mesh.fix(sides[~missing])
     if not all(mesh.put_in(a, b) for a, b in sides[missing].tolist()):
         return None
     mesh.make_delaunay()
     triangles = mesh.triangles()
-    edges = _Edges(triangles, len(points))
-    return triangles if edges.fill_the_hull(points) and edges.contain(sides).all() else None
+    edges = _Edges(triangles, len(scaled))
+    return triangles if edges.fill_the_hull(scaled) and edges.contain(sides).all() else None
 
 
 def _triangulated(points):
@@ -53,7 +56,8 @@ def _triangulated(points):
 
 
 def _scaled(points):
-    """The points by a power of two, which rounds nothing, none beyond 1; None if they are too few or not finite."""
+    """The points divided by a power of two, which rounds nothing, so that no coordinate exceeds 1; None if they are too
+    few, not finite or all zero."""
     largest = np.abs(points).max(initial=0)
     if len(points) < 3 or not 0 < largest < np.inf:
         return None
@@ -76,7 +80,10 @@ def _by_qhull(points):
 
 
 def _one_by_one(points):
-    """Triangles (t, 3) by putting in one point after the other, for points too near each other or a line for Qhull."""
+    """Triangles (t, 3) by putting in one point after the other, or None if points coincide or all lie on a line.
+
+    It is meant for points that lie too near to each other, or to a line, for Qhull.
+    """
     n = len(points)
     if len(np.unique(points @ [1, 1j])) < n:
         return None
@@ -95,9 +102,10 @@ def _one_by_one(points):
 
 
 def _by_rounds(points):
-    """An order of the points (n, 2), (n,): rounds of random ones, each twice the last, and in each by neighbourhood.
+    """An order of the points (n, 2) in which putting them in takes few steps and few flips, (n,).
 
-    Amenta, Choi and Rote 2003: so the next point is near, and all expect few flips.
+    Random points make rounds, each twice as large as the last one: so few flips are expected.  Within a round the order
+    goes by neighbourhood: so the next point is near (Amenta, Choi and Rote 2003).
     """
     n = len(points)
     rounds = np.frexp(1 + np.random.default_rng(0).permutation(n))[1]
@@ -114,7 +122,7 @@ class _Edges:
     or two do that are wound against each other.
     """
 
-    def __init__(self, triangles, n):
+    def __init__(self, triangles: np.ndarray, n: int):
         self.triangles = triangles
         self.n = n
         self.start, self.end = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
@@ -130,13 +138,13 @@ class _Edges:
     def _numbers(self, start, end):
         return np.minimum(start, end) * self.n + np.maximum(start, end)
 
-    def contain(self, sides):
-        """Which of the sides (s, 2) are edges."""
+    def contain(self, sides: np.ndarray) -> np.ndarray:
+        """Which of the sides (s, 2) are edges, (s,) bool."""
         number = self._numbers(*sides.T)
         place = np.searchsorted(self._sorted, number)
         return self._sorted[np.minimum(place, len(self._sorted) - 1)] == number
 
-    def fill_the_hull(self, points):
+    def fill_the_hull(self, points: np.ndarray) -> bool:
         """Whether the triangles are positive, and cover the convex hull of all points once: exactly.
 
         Positive triangles cover a place as often as their boundary winds around it.  That is once, if the boundary
@@ -160,12 +168,14 @@ class _Edges:
 
 
 class _Mesh:
-    """Triangles that change one at a time, as lists.
+    """Triangles that change one at a time, as Python lists, which are faster than arrays then.
 
-    Half-edges are numbered as in `_Edges`; beyond the hull's edges lie triangles to a point at infinity, number n.
+    Half-edges are numbered as in `_Edges`; beyond the hull's edges lie triangles to a point at infinity, number n.  The
+    lists have an entry for every half-edge: `origin`, the point where it starts; `twin`; `fixed`, whether it must stay;
+    `after` and `before`, the next and the previous one in its triangle.  `leaving` has one that starts at each point.
     """
 
-    def __init__(self, points, triangles, edges):
+    def __init__(self, points: np.ndarray, triangles: np.ndarray, edges: _Edges):
         n, count = len(points), 3 * len(triangles)
         rim = np.flatnonzero(edges.twin < 0)
         beyond = count + 3 * np.arange(len(rim))
@@ -184,28 +194,29 @@ class _Mesh:
         self.x, self.y = points.T.tolist()
         self.origin, self.twin, self.leaving = origin.tolist(), twin.tolist(), leaving.tolist()
         self.fixed = [False] * len(origin)
-        self.after, self.before = [], []
+        self.after: list[int] = []
+        self.before: list[int] = []
         self.reserve(len(origin) // 3)
 
-    def reserve(self, count):
-        """Make room for so many triangles."""
+    def reserve(self, count: int) -> None:
+        """Make `after` and `before` long enough for so many triangles."""
         half_edge = np.arange(3 * count).reshape(-1, 3)
         self.after, self.before = half_edge[:, [1, 2, 0]].ravel().tolist(), half_edge[:, [2, 0, 1]].ravel().tolist()
 
-    def triangles(self):
+    def triangles(self) -> np.ndarray:
         """The triangles (t, 3) without those to infinity."""
         triangles = np.array(self.origin, dtype=np.int64).reshape(-1, 3)
         return triangles[(triangles < self.n).all(axis=1)]
 
-    def fix(self, sides):
-        """Keep the edges `sides` (s, 2), which are there, from now on."""
+    def fix(self, sides: np.ndarray) -> None:
+        """Keep from now on the edges between the points `sides` (s, 2), all of which there are."""
         start = np.array(self.origin, dtype=np.int64)
         end = start[self.after]
         number = np.where((start < self.n) & (end < self.n), start * self.n + end, -1)
         self.fixed = np.isin(number, np.concatenate([sides @ [self.n, 1], sides @ [1, self.n]])).tolist()
 
-    def turn(self, a, b, c):
-        """Positive where the points number a, b, c turn left, negative to the right, 0 on a line: exactly."""
+    def turn(self, a: int, b: int, c: int) -> float:
+        """Positive where the way over the points a, b, c turns left, negative where right, 0 on a line: exactly."""
         x, y = self.x, self.y
         ax, ay = x[a], y[a]
         first = (x[b] - ax) * (y[c] - ay)
@@ -216,7 +227,7 @@ class _Mesh:
             return apart
         return _exact_turn((ax, ay), (x[b], y[b]), (x[c], y[c]))
 
-    def put_in(self, a, b):
+    def put_in(self, a: int, b: int) -> bool:
         """Make the side from a to b an edge; False if a point or another side is in the way.
 
         The triangles that it crosses are taken out, and the two polygons that are left filled anew.
@@ -241,6 +252,7 @@ class _Mesh:
         return True
 
     def _join(self, one, other, fixed):
+        """Make two half-edges the two sides of one edge."""
         self.twin[one], self.twin[other] = other, one
         self.fixed[one] = self.fixed[other] = fixed
 
@@ -275,7 +287,7 @@ class _Mesh:
             h = after[g] if self.turn(a, b, c) > 0 else before[g]
 
     def _banks(self, crossed):
-        """The half-edges around the triangles of the `crossed` ones: those on the right, and then on the left."""
+        """The half-edges around the triangles of the `crossed` ones: a list of those on the right, one for the left."""
         twin, after, before = self.twin, self.after, self.before
         inner = {*crossed, *(twin[h] for h in crossed)}
         right, left = [before[crossed[0]]], [after[crossed[0]]]
@@ -288,10 +300,11 @@ class _Mesh:
         return right, left[::-1]
 
     def _filled(self, corners, number, free, now):
-        """Fill a polygon that its last side sees all of, counter-clockwise; the half-edge of that side, None if none.
+        """Fill a polygon with triangles; returns the half-edge that its last side becomes, or None if that fails.
 
-        Then it suffices to cut off what turns left (Toussaint and Avis 1982).  Triangles are put where `free` says.
-        The other sides count from `number`, and `now` is told which half-edges they become.
+        The polygon is given by its points `corners`, counter-clockwise, and every place in it sees its last side: then
+        it suffices to cut off corners that turn left (Toussaint and Avis 1982).  The triangles' half-edges get the
+        numbers from `free`.  The other sides count from `number`: `now` is told which half-edges they become.
         """
         origin, leaving = self.origin, self.leaving
         kept, sides = [corners[0]], []  # the sides between the kept corners: half-edges, or ~ the number of one given
@@ -313,7 +326,7 @@ class _Mesh:
             sides.append(side)
         return sides[0] if len(sides) == 1 and sides[0] >= 0 else None
 
-    def insert(self, p):
+    def insert(self, p: int) -> bool:
         """Put in the point number p, beyond the hull as well; False if another one is in its place."""
         h = self._located(p)
         if h is None:
@@ -359,7 +372,7 @@ class _Mesh:
                 return h
         return None
 
-    def make_delaunay(self):
+    def make_delaunay(self) -> None:
         """Flip edges that are not fixed until all are Delaunay."""
         origin, twin = np.array(self.origin), np.array(self.twin)
         one = np.arange(len(origin))
@@ -371,7 +384,7 @@ class _Mesh:
         self._flip_to_delaunay(one[wrong].tolist())
 
     def _flip(self, h):
-        """Turn the edge of the half-edge h around in its quadrilateral, and return half-edges of the four sides."""
+        """Replace the edge of the half-edge h by its quadrilateral's other diagonal; returns the sides' half-edges."""
         origin, twin, fixed, after, before = self.origin, self.twin, self.fixed, self.after, self.before
         g = twin[h]
         ahead, behind = before[h], before[g]
@@ -388,8 +401,8 @@ class _Mesh:
     def _flip_to_delaunay(self, waiting):
         """Flip edges until those of the half-edges `waiting`, a list, are Delaunay, and those that flips reach.
 
-        Lawson 1977: each flip lowers the surface over the triangulation whose corners lie on a paraboloid, so that
-        there is an end, as long as only what rounding cannot excuse is flipped.
+        Lawson 1977: lifted on a paraboloid, the triangles are a surface, which each flip lowers; so there is an end, as
+        long as no edge is flipped for which rounding decides.
         """
         x, y = self.x, self.y
         origin, twin, fixed, before, n = self.origin, self.twin, self.fixed, self.before, self.n
@@ -420,6 +433,7 @@ def _in_circle(ax, ay, bx, by, cx, cy, dx, dy):
 
 
 def _exact_turn(a, b, c):
+    """As `_Mesh.turn`, of three points given as pairs of floats, in whole numbers."""
     ratios = [value.as_integer_ratio() for value in (*a, *b, *c)]
     whole = max(denominator for _, denominator in ratios)  # all are powers of two
     ax, ay, bx, by, cx, cy = (numerator * (whole // denominator) for numerator, denominator in ratios)

@@ -4,52 +4,51 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .errors import UVError
+from .certificate import orientation
 from .chart import Surface
+from .errors import UVError
 from .tensor import squared_stretches
 from .triangles import by_parts
-from .certificate import orientation
 
-
-def _per_triangle():
-    return field(repr=False, metadata={"per_triangle": True})
+_PER_TRIANGLE = {"per_triangle": True}  # marks the fields that are arrays (m,)
 
 
 @dataclass(frozen=True, eq=False)
 class Distortion:
-    """Measures of one map.  The arrays hold one value for every triangle; the ideal is 1, for `log_area` 0."""
+    """Measures of one map.  The arrays (m,) hold one value for every triangle; ideal 1, for `triangle_log_area` 0."""
 
     l2_stretch: float
     """Root mean square stretch from the plane to the surface (Sander et al. 2001); ideal 1."""
     symmetric_dirichlet: float
-    """Mean of (s1^2 + s2^2 + s1^-2 + s2^-2) / 4 at equal total areas; ideal 1."""
+    """Mean of (s1^2 + s2^2 + s1^-2 + s2^-2) / 4, s1 and s2 being the stretches at equal total areas; ideal 1."""
     angle: float
     """Mean ratio of the larger to the smaller stretch; ideal 1."""
     area: float
     """Root mean square of the logarithm of the relative area; ideal 0."""
     flips: int
-    """Triangles that are turned against their winding in 32-bit floats."""
+    """Triangles that lie against their winding in 32-bit floats."""
     collapsed: int
     """Triangles without area in 32-bit floats, those without area on the surface not counted."""
-    triangle_stretch: np.ndarray = _per_triangle()
-    triangle_angle: np.ndarray = _per_triangle()
-    triangle_log_area: np.ndarray = _per_triangle()
-    triangle_orientation: np.ndarray = _per_triangle()
+    triangle_stretch: np.ndarray = field(repr=False, metadata=_PER_TRIANGLE)
+    triangle_angle: np.ndarray = field(repr=False, metadata=_PER_TRIANGLE)
+    triangle_log_area: np.ndarray = field(repr=False, metadata=_PER_TRIANGLE)
+    triangle_orientation: np.ndarray = field(repr=False, metadata=_PER_TRIANGLE)
 
-    def to_dict(self):
-        """The measures without the arrays."""
+    def to_dict(self) -> dict[str, float]:
+        """The measures by their names, without the arrays."""
         names = ("l2_stretch", "symmetric_dirichlet", "angle", "area", "flips", "collapsed")
         return {name: getattr(self, name) for name in names}
 
 
-def measure(surface, uv):
+def measure(surface: Surface, uv: np.ndarray) -> Distortion:
     """The `Distortion` of the map `uv` (n, 2) of a `Surface` of one piece."""
     return measure_pieces(surface, uv)[0]
 
 
-def measure_pieces(surface, uv):
-    """The `Distortion` of every piece's map, a list."""
+def measure_pieces(surface: Surface, uv: np.ndarray) -> list[Distortion]:
+    """The `Distortion` of every piece's map."""
     larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
     share = surface.measure / surface.sums(surface.measure)[surface.piece]
     squared, dirichlet, angle, log_area = by_parts(_measures, larger, smaller)
@@ -74,7 +73,7 @@ def _measures(larger, smaller):
     return squared, dirichlet, np.sqrt(larger / smaller), (np.log(larger) + np.log(smaller)) / 2
 
 
-def distortion(vertices, triangles, uv):
+def distortion(vertices: ArrayLike, triangles: ArrayLike, uv: ArrayLike) -> Distortion:
     """The `Distortion` of a map.
 
     Parameters
@@ -89,7 +88,7 @@ def distortion(vertices, triangles, uv):
     return measure(surface, checked_uv(len(surface.vertices), uv))
 
 
-def checked_uv(n: int, uv) -> np.ndarray:
+def checked_uv(n: int, uv: ArrayLike) -> np.ndarray:
     """`uv` as an (n, 2) array of finite floats; raises `UVError`."""
     uv = np.asarray(uv, dtype=np.float64)
     if uv.shape != (n, 2):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What can be wrong with the input, one type per cause; each message says what, where and what to do."""
 
+import numpy as np
+
 
 class UnwrapError(ValueError):
     """Base of every error that the core raises about its input."""
@@ -31,16 +33,16 @@ class PinError(UnwrapError):
 
 
 class BoundaryError(UnwrapError):
-    """The kept boundary crosses itself or encloses nothing, or a free one has no triangulator."""
+    """The outline cannot go where the settings want it, or a triangulator of the caller's returned no triangulation."""
 
 
 class SurfaceError(UnwrapError):
     """The triangles do not make a surface that can be unwrapped.
 
-    `triangles` holds the indices of the triangles at fault, where single ones are (else it is empty).
+    `triangles` holds the indices (k,) of the triangles at fault; it is empty where no single ones are.
     """
 
-    def __init__(self, message, triangles=()):
+    def __init__(self, message: str, triangles: np.ndarray | tuple[()] = ()):
         super().__init__(message)
         self.triangles = triangles
 

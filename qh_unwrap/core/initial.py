@@ -18,8 +18,11 @@ def weighted_map(domain: Held, initial: str) -> np.ndarray:
     return domain.constrained.solve(domain.triangles.joined([make(chart) for chart in domain.charts]))
 
 
-def fit(points, chosen, targets, mirror=False):
-    """Move `points` (n, 2) by the similarity that brings the `chosen` nearest to their targets, or a mirrored one."""
+def fit(points: np.ndarray, chosen: np.ndarray, targets: np.ndarray, mirror: bool = False) -> np.ndarray:
+    """The points (n, 2) moved by the similarity that brings the `chosen` ones, (n,) bool, nearest to `targets` (n, 2).
+
+    With `mirror` it may be a mirrored similarity, if that brings them nearer.
+    """
     z, target = (xy[:, 0] + 1j * xy[:, 1] for xy in (points, targets))
     best = min(
         (_fit(candidate, chosen, target) for candidate in ((z, z.conj()) if mirror else (z,))),
@@ -29,18 +32,19 @@ def fit(points, chosen, targets, mirror=False):
 
 
 def _fit(z, chosen, target):
+    """How far the chosen points stay from their targets, and all points moved; points are complex numbers (n,)."""
     centred, wanted = z - z[chosen].mean(), target[chosen] - target[chosen].mean()
     size = np.vdot(centred[chosen], centred[chosen]).real
-    turn = (np.vdot(centred[chosen], wanted) / size if size > 0 else 0) or 1.0
-    fitted = turn * centred + target[chosen].mean()
+    factor = (np.vdot(centred[chosen], wanted) / size if size > 0 else 0) or 1.0  # it rotates and scales
+    fitted = factor * centred + target[chosen].mean()
     return np.linalg.norm(fitted[chosen] - target[chosen]), fitted
 
 
-def project(surface):
-    """Projection of every piece on its least-squares plane, seen from the side that its faces turn to, (n, 2)."""
+def project(surface: Surface) -> np.ndarray:
+    """The projection of every piece on its least-squares plane, seen from the side that its faces look to, (n, 2)."""
 
-    def moments(corner):
-        corners = corners_of(surface.vertices, corner.T)
+    def moments(corner_vertex):
+        corners = corners_of(surface.vertices, corner_vertex.T)
         normal = normals(corners).T
         share = np.linalg.norm(normal, axis=0)
         # The second moments of a triangle are those of its corners and of three times its centre, each a twelfth.
@@ -56,7 +60,7 @@ def project(surface):
     across, right = axes[:, :, 0], axes[:, :, 2]  # the least and the most extent
     back = (normal.T * across).sum(axis=1) < 0
     across = np.where(back[:, None], -across, across)
-    # Of the two ways round, the one with the farther end to the right: it turns with the surface.
+    # Of the two ways round, take that with the farther end to the right: a rotated surface has the same map.
     piece, starts = surface.vertex_piece, surface.vertex_starts
     along = np.einsum("ij,ij->i", surface.vertices, right[piece])
     left = np.maximum.reduceat(along, starts) < -np.minimum.reduceat(along, starts)
@@ -67,11 +71,11 @@ def project(surface):
 
 
 def conformal(surface: Surface) -> np.ndarray:
-    """Conformal map of every piece with a natural boundary, (n, 2): the flattening of Sawhney, Crane 2017 that scales
-    no outline.
+    """The conformal map of every piece with the lengths of its outline, (n, 2): a flattening of Sawhney, Crane 2017.
 
-    Of all conformal maps of a disk it has the least area distortion: its scale factors exp(u) are 1 along the outline,
-    u solves Yamabe's equation, and tells how much the outline turns at each vertex.  Holes are closed meanwhile.
+    Of all conformal maps of a disk it has the least area distortion: its scale factors exp(u) are 1 along the outline.
+    u solves Yamabe's equation, and its flux out of the outline tells how much the map's outline bends at each vertex.
+    Holes are closed meanwhile.
     """
     loop = np.concatenate(surface.outlines)
     starts = starts_of(surface.outlines)
@@ -80,7 +84,7 @@ def conformal(surface: Surface) -> np.ndarray:
     solid = Held(surface, fixed, surface.plugs(solid=True))
     n = len(solid.vertex_piece)
     weights = solid.triangles.joined([cotangent(chart) for chart in solid.charts])
-    angle_sums = sum(chart.angle_sums(n) for chart in solid.charts)
+    angle_sums = np.sum([chart.angle_sums(n) for chart in solid.charts], axis=0)
     solve = solid.constrained.factor(weights)
     u = solve(np.zeros((n, 1)), (angle_sums - 2 * np.pi)[:, None])[:, 0]
     i, j = solid.triangles.edges.T

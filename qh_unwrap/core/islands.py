@@ -27,8 +27,15 @@ class Island:
     crowded_edges: int = 0  # edges of its outline where more than two faces meet
 
 
-def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_triangles):
-    """Split the selected faces into islands, ordered by their first face.
+def find_islands(
+    corner_vertex: np.ndarray,
+    corner_edge: np.ndarray,
+    face_start: np.ndarray,
+    seam: np.ndarray,
+    selected: np.ndarray,
+    corner_triangles: np.ndarray,
+) -> list[Island]:
+    """The islands that the selected faces make, ordered by their first face.
 
     corner_vertex, corner_edge  (c,) vertex and edge of each corner
     face_start                  (f,) first corner of each face, ascending
@@ -90,8 +97,15 @@ def find_islands(corner_vertex, corner_edge, face_start, seam, selected, corner_
     return [Island(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
 
 
-def cuts(corner_vertex, corner_edge, face_start, edge_count, uv, tolerance=1e-6):
-    """The edges (e,) bool where two faces meet in space and their corners' UVs (c, 2) do not."""
+def cuts(
+    corner_vertex: np.ndarray,
+    corner_edge: np.ndarray,
+    face_start: np.ndarray,
+    edge_count: int,
+    uv: np.ndarray,
+    tolerance: float = 1e-6,
+) -> np.ndarray:
+    """The edges, (e,) bool, where two faces meet in space and their corners' UVs (c, 2) do not."""
     corners = np.arange(len(corner_vertex))
     _, following = _around_faces(face_start, len(corners))
     seam = np.zeros(edge_count, dtype=bool)
@@ -101,8 +115,16 @@ def cuts(corner_vertex, corner_edge, face_start, edge_count, uv, tolerance=1e-6)
     return cut
 
 
-def attached(corner_vertex, corner_edge, face_start, seam, selected, uv, tolerance=1e-5):
-    """The corners (c,) bool of selected faces that hang on unselected ones: no seam parts them, nor do the UVs."""
+def attached(
+    corner_vertex: np.ndarray,
+    corner_edge: np.ndarray,
+    face_start: np.ndarray,
+    seam: np.ndarray,
+    selected: np.ndarray,
+    uv: np.ndarray,
+    tolerance: float = 1e-5,
+) -> np.ndarray:
+    """The corners, (c,) bool, of selected faces that hang on unselected ones: no seam parts them, nor do the UVs."""
     corners = np.arange(len(corner_vertex))
     corner_face, following = _around_faces(face_start, len(corners))
     one, start, end = _across_edges(corner_vertex, corner_edge, following, seam, corners)
@@ -114,6 +136,7 @@ def attached(corner_vertex, corner_edge, face_start, seam, selected, uv, toleran
 
 
 def _gaps(uv, one, start, end, following):
+    """How far the UVs of two faces lie apart at most along the edges that `_across_edges` returns, (k,)."""
     return np.abs(np.hstack([uv[one] - uv[start], uv[following[one]] - uv[end]])).max(axis=1)
 
 
@@ -127,7 +150,8 @@ def _around_faces(face_start, corner_count):
 
 
 def _across_edges(corner_vertex, corner_edge, following, seam, corners):
-    """Where an edge joins two faces: the corner of one that starts it, and the other's corners at its start and end."""
+    """Three corners for every edge that joins two faces, (k,) each: that of one face that starts the edge, and those of
+    the other face at the edge's start and end."""
     uses = np.bincount(corner_edge[corners], minlength=len(seam))
     inner = (uses == 2) & ~seam
     one, other = (each[inner] for each in first_and_last(corners, corner_edge[corners], len(seam)))
@@ -136,12 +160,12 @@ def _across_edges(corner_vertex, corner_edge, following, seam, corners):
 
 
 def _uv_vertices(one, start, end, following):
-    """The UV vertex of each corner, where faces hang together as `_across_edges` says."""
+    """The UV vertex of each corner, (c,), where faces hang together across the edges that `_across_edges` returns."""
     return components(len(following), np.concatenate([one, following[one]]), np.concatenate([start, end]))[1]
 
 
 def _without_doubled_diagonals(triangles, following, uv_vertex):
-    """Triangles (t, 3) of the same faces, of which no two have a diagonal between the same two vertices.
+    """Triangles (t, 3) of the same faces, of which no two faces have a diagonal between the same two vertices.
 
     Faces are triangulated one by one, so where two of them share several edges in a row, both may be cut along the
     same diagonal, and the triangles beside it would lie on top of each other.  Such diagonals are flipped.

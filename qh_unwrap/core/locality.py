@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Large meshes in an order in which neighbours in space are neighbours in memory, where processors find them sooner."""
 
+from __future__ import annotations
+
 from dataclasses import fields, replace
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-MANY = 40_000  # vertices: fewer fit into the processor's cache
+if TYPE_CHECKING:
+    from .report import Result
+
+MANY = 40_000  # vertices above which a mesh is worth sorting: a smaller one fits into the processor's cache
 
 
 class Sorted:
-    """A mesh, `vertices` (n, 3) and `triangles` (m, 3), sorted, and the way back."""
+    """A mesh, `vertices` (n, 3) and `triangles` (m, 3), sorted, and the way back to its own order."""
 
-    def __init__(self, vertices, triangles):
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray):
         self._order = cKDTree(vertices, leafsize=32, balanced_tree=False, compact_nodes=False).indices
         self._place = np.argsort(self._order)
         triangles = self._place[triangles]
@@ -21,23 +27,28 @@ class Sorted:
         self.vertices = vertices[self._order]
         self.triangles = triangles[self._triangle_order]
 
-    def sorted(self, values):
-        """Values at the vertices (n, ...), or None."""
+    @overload
+    def sorted(self, values: np.ndarray) -> np.ndarray: ...
+    @overload
+    def sorted(self, values: None) -> None: ...
+    def sorted(self, values: np.ndarray | None) -> np.ndarray | None:
+        """Values (n, ...) at the vertices in the sorted order; None for None."""
         return None if values is None else np.asarray(values)[self._order]
 
-    def restored(self, values):
-        """The same in the mesh's own order."""
+    def restored(self, values: np.ndarray) -> np.ndarray:
+        """Values (n, ...) at the sorted vertices in the mesh's own order."""
         return values[self._place]
 
-    def renumbered(self, vertices):
-        """For every sorted vertex (n, ...) the sorted number of the vertex that it is given."""
+    def renumbered(self, vertices: np.ndarray) -> np.ndarray:
+        """Numbers of vertices (n, ...), given for every vertex, as sorted numbers for every sorted vertex."""
         return self._place[vertices][self._order]
 
-    def own_triangles(self, triangles):
-        """The numbers that triangles have in the mesh's own order."""
+    def own_triangles(self, triangles: np.ndarray) -> np.ndarray:
+        """The numbers that sorted triangles, given by their numbers (k,), have in the mesh's own order."""
         return self._triangle_order[triangles]
 
-    def restored_result(self, result):
+    def restored_result(self, result: Result) -> Result:
+        """The result of the sorted mesh as that of the mesh in its own order."""
         report = result.report
         measured = {name: self._restored_distortion(getattr(report, name)) for name in ("before", "initial", "after")}
         loops = [self._order[loop] for loop in result.loops]

@@ -6,24 +6,24 @@ import sys
 
 from .errors import OutOfMemoryError
 
-_PER_VERTEX = 3500  # bytes, measured on large islands: the factors take up to 1.4 kB of them, arrays the rest
+_PER_VERTEX = 3500  # bytes for each vertex, measured on large islands: up to 1400 for the factors, the rest for arrays
 
 
-def suffices(vertices, free):
-    """Whether the `free` bytes, None if these are not known, are enough for an island of so many vertices."""
+def suffices(vertices: int, free: int | None) -> bool:
+    """Whether `free` bytes are enough for islands of so many vertices; True where None says that nobody knows."""
     return free is None or vertices * _PER_VERTEX <= free
 
 
-def check(vertices, free):
-    """Raise `OutOfMemoryError` if they are not."""
-    if not suffices(vertices, free):
+def check(vertices: int, free: int | None) -> None:
+    """Raise `OutOfMemoryError` where `free` bytes are known not to suffice."""
+    if free is not None and not suffices(vertices, free):
         raise OutOfMemoryError(
             f"it needs about {vertices * _PER_VERTEX / 1e9:.1f} GB of memory and {free / 1e9:.1f} GB are free:"
             " mark seams to cut it into smaller islands, or close other programs"
         )
 
 
-def free():
+def free() -> int | None:
     """Bytes that programs can still take, None where the system does not say."""
     if sys.platform == "linux":
         return _free_on_linux()

@@ -7,24 +7,20 @@ from .chart import Surface
 from .triangles import corner_angles
 from .weights import cotangent
 
-_NEGATIVE = -1e-9
+_NEGATIVE = -1e-9  # cotangent weight below which an edge counts as negative: what lies above may be rounding
 
 
-def refine_obtuse(surface, limit=16):
-    """Split longest edges until no inner edge has a negative cotangent weight.
+def refine_obtuse(surface: Surface, limit: float = 16) -> tuple[Surface, np.ndarray]:
+    """The surface, of one piece, with edges split until no inner edge has a negative cotangent weight.
 
-    Parameters
-    ----------
-    surface : Surface
-    limit : stop when there are this many times as many triangles
+    Also returns, for each of its triangles, the triangle that it was cut from, (m',).  The original vertices come
+    first, so `uv[:n]` leads back.  It stops early when there are `limit` times as many triangles;
+    `has_positive_weights` tells whether it had to.
 
-    Returns the refined `Surface` and, for each of its triangles, the triangle it was cut from, (m',).  The original
-    vertices come first, so `uv[:n]` leads back.  `has_positive_weights` tells whether the limit was met.
-
-    Rivara's bisection, which the paper names, halves these edges.  Halves of an obtuse triangle contain triangles
-    similar to it, so that a third of all triangles stays obtuse however long one goes on.  An edge with a negative
-    weight is split here where the heights of its two triangles meet it, which ends far more often; and each round
-    splits edges that share no triangle, so that nothing has to be split along.
+    Rivara's bisection, which the paper names, halves longest edges.  Halves of an obtuse triangle contain triangles
+    similar to it, so that a third of all triangles stays obtuse however long one goes on.  Here an edge with a negative
+    weight is split where the heights of its two triangles meet it, which ends far more often; and each round splits
+    edges that share no triangle, so that no other edges need to be split with them.
     """
     n = len(surface.triangles)
     parents = np.arange(n)
@@ -39,14 +35,15 @@ def refine_obtuse(surface, limit=16):
     return surface, parents
 
 
-def has_positive_weights(surface):
-    """Whether all cotangent weights between inner neighbours are positive: then a harmonic map with a convex boundary
-    has no flips.  For quasi-harmonic maps their tensors must also be nearly multiples of the identity.
+def has_positive_weights(surface: Surface) -> bool:
+    """Whether no inner edge has a negative cotangent weight: then a harmonic map with a convex boundary has no flips.
+
+    A quasi-harmonic map has none if, besides, its tensors are nearly multiples of the identity.
     """
-    return not negative_edges(surface).any()
+    return not bool(negative_edges(surface).any())
 
 
-def negative_edges(surface):
+def negative_edges(surface: Surface) -> np.ndarray:
     """The inner edges with a negative cotangent weight, (k,) bool; those of the boundary enter no equation."""
     negative = cotangent(surface)[0] < _NEGATIVE
     negative[surface.half_edge_edges[surface.on_boundary]] = False
@@ -54,7 +51,8 @@ def negative_edges(surface):
 
 
 def _opposite(surface):
-    """For every edge the sum of the angles that face it, and where along it the heights meet it on average."""
+    """For every edge the sum of the angles opposite to it, in radians, and the place where the heights of its triangles
+    meet it on average, from 0 at its start to 1 at its end, (k,) each."""
     edge = surface.half_edge_edges
     angle = np.roll(corner_angles(surface.rest), -2, axis=1).T.ravel()
     third = np.roll(surface.triangles.T, -2, axis=0).ravel()
@@ -67,7 +65,7 @@ def _opposite(surface):
 
 
 def _worst_of_both_triangles(surface, badness):
-    """Edges of positive badness that no triangle of theirs has a worse one than, (k,) bool."""
+    """The edges with a positive `badness` (k,) that are the worst edge of each of their triangles, (k,) bool."""
     rank = np.empty(len(badness), dtype=np.int64)
     rank[np.argsort(badness, kind="stable")] = np.arange(len(badness))
     own = rank[surface.triangle_edges]
@@ -76,7 +74,10 @@ def _worst_of_both_triangles(surface, badness):
 
 
 def _split(surface, chosen, at):
-    """Split the `chosen` edges, of which a triangle has at most one; also tells the triangles' origins."""
+    """The surface with the `chosen` edges, (k,) bool, split at the places `at` (k,), and each triangle's origin, (m',).
+
+    A triangle has at most one chosen edge.
+    """
     start, end = surface.vertices[surface.edges[chosen]].transpose(1, 0, 2)
     new_vertex = np.full(len(chosen), -1)
     new_vertex[chosen] = len(surface.vertices) + np.arange(len(start))

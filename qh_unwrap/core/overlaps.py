@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which islands lie on top of each other in the plane."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .certificate import near_boxes
 from .placing import boxes
 
-_DEPTH = 1e-5  # of the size of the smaller triangle: what merely touches does not overlap
+_DEPTH = 1e-5  # depth, relative to the size of the smaller triangle, up to which two triangles merely touch
 
 
-def overlapping(islands):
+def overlapping(islands: Sequence[np.ndarray]) -> list[tuple[int, int]]:
     """The pairs (i, j), i < j, of islands, each given as triangles (t, 3, 2), that share some area."""
     found = []
     for one, other in _meeting(*boxes([island.reshape(-1, 2) for island in islands])):
@@ -18,7 +20,7 @@ def overlapping(islands):
     return sorted(found)
 
 
-def overlap(one, other):
+def overlap(one: np.ndarray, other: np.ndarray) -> bool:
     """Whether triangles (s, 3, 2) share some area with triangles (t, 3, 2)."""
     low = np.maximum(one.min(axis=(0, 1)), other.min(axis=(0, 1)))
     high = np.minimum(one.max(axis=(0, 1)), other.max(axis=(0, 1)))
@@ -34,6 +36,7 @@ def overlap(one, other):
 
 
 def _meets(triangles, low, high):
+    """Which triangles (t, 3, 2) have a box that shares some area with that from `low` to `high`, (t,) bool."""
     return ((triangles.max(axis=1) > low) & (triangles.min(axis=1) < high)).all(axis=1)
 
 
@@ -45,7 +48,11 @@ def _meeting(low, high):
 
 
 def _share_area(one, other):
-    """For pairs of triangles (k, 3, 2): whether no side of either has them on different sides of it."""
+    """Which pairs of triangles, (k, 3, 2) each, share some area, (k,) bool.
+
+    Two triangles share none if and only if some side of either has them on different sides of it.  So both are measured
+    across each of the six sides: how far their ranges there overlap is how deep they lie in each other.
+    """
     shared = np.ones(len(one), dtype=bool)
     least = _DEPTH * np.minimum(np.ptp(one, axis=1).max(axis=1), np.ptp(other, axis=1).max(axis=1))
     for sides in (np.roll(one, -1, axis=1) - one, np.roll(other, -1, axis=1) - other):

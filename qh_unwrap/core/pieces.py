@@ -1,36 +1,50 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Arrays of several pieces laid end to end, and where each begins."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 
-def starts_of(arrays):
+def starts_of(arrays: Sequence[np.ndarray]) -> np.ndarray:
     """Where each of the arrays begins when they are joined, (p,)."""
     return np.cumsum([0, *(len(each) for each in arrays[:-1])])
 
 
-def numbers(starts, count):
-    """The piece of each of `count` items, of which those of a piece begin at `starts` (p,)."""
+def numbers(starts: np.ndarray, count: int) -> np.ndarray:
+    """The piece of each of `count` items, (count,), if those of each piece begin at its place in `starts` (p,)."""
     return np.repeat(np.arange(len(starts)), np.diff(starts, append=count))
 
 
-def first_and_last(items, place, count):
-    """The first and the last of the `items` (k,) at each of `count` places, (count,) each; anything where is none."""
+def first_and_last(items: np.ndarray, place: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The first and the last item at each of `count` places, (count,) each; anything at a place that has none.
+
+    `place` (k,) tells where each of the `items` (k,) is.  Where several numbers are assigned to one place of an array,
+    NumPy keeps the last of them: assigned in reverse, that is the first.  This finds pairs without sorting.
+    """
     first, last = np.empty((2, count), items.dtype)
     first[place[::-1]], last[place] = items[::-1], items
     return first, last
 
 
-def components(count, one, other):
-    """How many parts things fall into that are linked in pairs, and that of each, (count,)."""
-    one, other = one.astype(np.int32), other.astype(np.int32)  # as SciPy has them, and the links as numbers
+def components(count: int, one: np.ndarray, other: np.ndarray) -> tuple[int, np.ndarray]:
+    """How many parts `count` things fall into, and the part of each, (count,).
+
+    The k-th link joins the things `one[k]` and `other[k]`; parts are what hangs together by links.
+    """
+    one, other = one.astype(np.int32), other.astype(np.int32)  # the type that SciPy would convert them to
     return connected_components(coo_array((np.ones(len(one)), (one, other)), shape=(count, count)), directed=False)
 
 
-def joined(points, triangles):
-    """Points (n, d) and triangles (m, 3) of several meshes, two lists, as one mesh, and where each begins in both."""
+def joined(
+    points: Sequence[np.ndarray], triangles: Sequence[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Several meshes as one: its points (n, d), its triangles (m, 3), and where each mesh begins in both, (p,) each.
+
+    The k-th mesh has the points `points[k]` and the `triangles[k]` of these.
+    """
     point_starts, triangle_starts = starts_of(points), starts_of(triangles)
     moved = [its + start for its, start in zip(triangles, point_starts, strict=True)]
     return np.concatenate(points), np.concatenate(moved), point_starts, triangle_starts

@@ -1,55 +1,57 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Putting unwrapped islands where they belong: back in place, upright, or each into the unit square."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from .pieces import joined, numbers, starts_of
-from .triangles import areas_in_space, box, corners_of, signed_areas
+from .triangles import areas_in_space, corners_of, signed_areas
 
-_STEEPEST_FLAT = 0.25  # an island that climbs less than this, by the way along it, has no upper end
+_STEEPEST_FLAT = 0.25  # slope, height by way along the island, up to which it lies flat and has no upper end
 
 
-def says_where(corners):
+def says_where(corners: np.ndarray) -> bool:
     """Whether these UVs, given as triangles (t, 3, 2), say where an island belongs.
 
-    They do if they have some area and are no pile of faces, such as those of a new map, where each fills the square.
+    They do if they have some area and are no pile of faces, as in a new UV map, where each face fills the square.
     """
     if not np.isfinite(corners).all():
         return False
     area = np.abs(signed_areas(corners)).sum()
-    return 1e-12 < area <= 1.01 * np.prod(np.ptp(corners.reshape(-1, 2), axis=0))
+    return bool(1e-12 < area <= 1.01 * np.prod(np.ptp(corners.reshape(-1, 2), axis=0)))
 
 
-def in_place(uv, triangles, old):
-    """Move, turn and scale `uv` (n, 2) onto `old`, the triangles' old UVs (t, 3, 2).
+def in_place(uv: np.ndarray, triangles: np.ndarray, old: np.ndarray) -> np.ndarray:
+    """The UVs (n, 2) of triangles (t, 3) moved, rotated and scaled onto `old`, the triangles' old UVs (t, 3, 2).
 
-    Keeps centre and area, and turns it as fits best in the sense of least squares.
+    They get the old centre and area, and the rotation that fits best in the sense of least squares.
     """
     new = uv[triangles]
     area, old_area = (np.abs(signed_areas(each)).sum() for each in (new, old))
     centre, old_centre = _centre(new), _centre(old)
     z, w = ((each.reshape(-1, 2) - middle) @ (1, 1j) for each, middle in ((new, centre), (old, old_centre)))
-    turn = np.vdot(z, w)
-    turn = turn / abs(turn) if abs(turn) > 1e-9 * np.linalg.norm(z) * np.linalg.norm(w) else 1.0
-    moved = (uv - centre) @ (1, 1j) * turn * np.sqrt(old_area / area)
+    rotation = np.vdot(z, w)
+    rotation = rotation / abs(rotation) if abs(rotation) > 1e-9 * np.linalg.norm(z) * np.linalg.norm(w) else 1.0
+    moved = (uv - centre) @ (1, 1j) * rotation * np.sqrt(old_area / area)
     return np.column_stack([moved.real, moved.imag]) + old_centre
 
 
-def is_mirrored(corners):
-    """Whether most of these UVs, given as triangles (t, 3, 2), are."""
-    return signed_areas(corners).sum() < 0
+def is_mirrored(corners: np.ndarray) -> bool:
+    """Whether most of the area of these UVs, given as triangles (t, 3, 2), is mirrored."""
+    return bool(signed_areas(corners).sum() < 0)
 
 
-def upright(islands):
-    """Turn islands, each given as (uv, vertices, triangles, up), so that what is up in space is up; returns their UVs.
+def upright(islands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    """The UVs of islands, each given as (uv, vertices, triangles, up), rotated so that what is up in space is up.
 
-    Where one lies too flat for that, it is turned to its smallest box.
+    Where one lies too flat for that, it is rotated so that its bounding box is the smallest.
     """
     uvs = [uv for uv, _, _, _ in islands]
     heights = [vertices @ up for _, vertices, _, up in islands]
-    points = [np.column_stack(each) for each in zip(uvs, heights, strict=True)]
-    points, triangles, _, starts = joined(points, [its for _, _, its, _ in islands])
+    lifted = [np.column_stack(each) for each in zip(uvs, heights, strict=True)]
+    points, triangles, _, starts = joined(lifted, [its for _, _, its, _ in islands])
     x, y, height = corners_of(points, triangles).T
     piece = numbers(starts, len(triangles))
     weight = np.abs(signed_areas(corners_of(points[:, :2], triangles)))
@@ -65,34 +67,41 @@ def upright(islands):
     spread = np.moveaxis(np.array([[xx, xy], [xy, yy]]), 2, 0)
     slope = (np.linalg.pinv(spread) @ np.column_stack([xh, yh])[:, :, None])[:, :, 0]
     steepness = np.linalg.norm(slope, axis=1)
-    turned = []
+    rotated = []
     for uv, steep, way in zip(uvs, steepness > _STEEPEST_FLAT, slope @ (1, 1j), strict=True):
-        turned.append(_turned(uv, 1j * abs(way) / way) if steep else _on_smallest_box(uv))
-    return turned
+        rotated.append(_rotated(uv, 1j * abs(way) / way) if steep else _in_smallest_box(uv))
+    return rotated
 
 
-def _on_smallest_box(uv):
-    """Turned so that its bounding box is the smallest, and lies rather than stands."""
+def _in_smallest_box(uv):
+    """UVs (n, 2) rotated so that their bounding box is the smallest, and lies rather than stands.
+
+    One of its sides then lies along a side of the convex hull, so only these directions are tried.
+    """
     try:
         outline = uv[ConvexHull(uv).vertices]
     except QhullError:
         return uv
     side = (np.roll(outline, -1, axis=0) - outline) @ (1, 1j)
-    turns = np.abs(side[side != 0]) / side[side != 0]
-    turned = (outline @ (1, 1j))[:, None] * turns
-    extents = np.column_stack([np.ptp(turned.real, axis=0), np.ptp(turned.imag, axis=0)])
-    best = np.argmin(extents.prod(axis=1))
-    width, height = extents[best]
-    return _turned(uv, turns[best] * (1 if width >= height else -1j))
+    rotations = np.abs(side[side != 0]) / side[side != 0]
+    rotated = (outline @ (1, 1j))[:, None] * rotations
+    sizes = np.column_stack([np.ptp(rotated.real, axis=0), np.ptp(rotated.imag, axis=0)])
+    best = np.argmin(sizes.prod(axis=1))
+    width, height = sizes[best]
+    return _rotated(uv, rotations[best] * (1 if width >= height else -1j))
 
 
-def _turned(uv, turn):
-    z = uv @ (1, 1j) * turn
+def _rotated(uv, rotation):
+    """UVs (n, 2) multiplied, as complex numbers, by one of length 1."""
+    z = uv @ (1, 1j) * rotation
     return np.column_stack([z.real, z.imag])
 
 
-def free_tile(rest):
-    """The first tile to the right, 0 for the unit square itself, that has nothing of the UVs (k, 2) in or beside it."""
+def free_tile(rest: np.ndarray) -> int:
+    """The number of a free tile in the row of the unit square, which is number 0, beside other UVs (k, 2).
+
+    The unit square is free if all UVs in its row lie on one side of it; else take the first tile to the right of all.
+    """
     least = 1e-6
     across = rest[(rest[:, 1] > least) & (rest[:, 1] < 1 - least), 0]
     if not len(across) or across.max() < least or across.min() > 1 - least:
@@ -100,36 +109,38 @@ def free_tile(rest):
     return int(np.ceil(across.max() - least))
 
 
-def in_unit_square(uv):
-    """Scale `uv` (n, 2) until its longer side is 1, in the middle of the 0 to 1 square."""
-    low, size = box(uv)
+def in_unit_square(uv: np.ndarray) -> np.ndarray:
+    """The UVs (n, 2) scaled until the longer side of their box is 1, in the middle of the 0 to 1 square."""
+    (low,), (high,) = boxes([uv])
+    size = high - low
     scale = 1 / size.max() if size.max() > 0 else 1.0
     return (uv - low) * scale + (1 - size * scale) / 2
 
 
-def areas(islands):
+def areas(islands: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """The areas in space, (k,), of islands given as (vertices, triangles)."""
     points, triangles, _, starts = joined(*zip(*islands, strict=True))
     return np.add.reduceat(areas_in_space(points, triangles), starts)
 
 
-def areas_of_triangles(vertices, triangles):
+def areas_of_triangles(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """The areas in space (t,) of triangles (t, 3) with vertices (n, 3)."""
     return areas_in_space(vertices, triangles)
 
 
-def uv_areas(islands):
+def uv_areas(islands: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """The areas in the layout, (k,), of islands given as (uv, triangles)."""
     uv, triangles, _, starts = joined(*zip(*islands, strict=True))
     return np.add.reduceat(np.abs(signed_areas(corners_of(uv, triangles))), starts)
 
 
-def boxes(uvs):
-    """Lower left and upper right corners, (k, 2) each, of the islands' UVs."""
+def boxes(uvs: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """The lower left and the upper right corners, (k, 2) each, of the boxes around islands with these UVs, (n, 2)."""
     starts, uv = starts_of(uvs), np.concatenate(uvs)
     return np.minimum.reduceat(uv, starts), np.maximum.reduceat(uv, starts)
 
 
 def _centre(corners):
+    """The centre of area, (2,), of triangles (t, 3, 2), all counted as positive."""
     weight = np.abs(signed_areas(corners))
     return weight @ corners.mean(axis=1) / weight.sum()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class State:
     uv: np.ndarray = field(repr=False)
     """(n, 2)"""
     change: float
-    """The largest movement of a vertex by the layout's diameter; infinite for the initial map."""
+    """The largest movement of a vertex, relative to the layout's diameter; infinite for the initial map."""
     valid: bool
     """No triangle, air included, is flipped or collapsed in 32-bit floats."""
     converged: bool
@@ -53,24 +54,24 @@ class Report:
     """What an unwrap did."""
 
     before: Distortion | None
-    """Of the UVs that were given, if any."""
+    """That of the UVs that were given, if any."""
     initial: Distortion
-    """Of the initial map."""
+    """That of the initial map."""
     after: Distortion
-    """Of the result."""
+    """That of the result."""
     iterations: int
-    """Those of the refinement included."""
+    """How many there were, those of the refinement included."""
     converged: bool
     """The last iteration moved no vertex by more than the tolerance, or the refinement no longer paid."""
     changes: tuple[float, ...]
-    """For every iteration, the largest movement of a vertex by the layout's diameter."""
+    """For every iteration, the largest movement of a vertex, relative to the layout's diameter."""
     injective: bool
-    """Certified in 32-bit floats: no triangle is flipped and no two overlap."""
+    """It is certified in 32-bit floats that no triangle is flipped and no two overlap."""
     mirrored: bool
     """The given UVs were mirrored and the result is too; flips are counted the other way round."""
     warnings: tuple[str, ...]
 
-    def to_dict(self) -> dict:
+    def to_dict(self) -> dict[str, Any]:
         """As plain numbers, lists and dictionaries, without the arrays over triangles."""
         names = ("iterations", "converged", "injective", "mirrored")
         return {
@@ -89,9 +90,9 @@ class Result:
 
     uv: np.ndarray = field(repr=False)
     report: Report
-    loops: list = field(repr=False)
+    loops: list[np.ndarray] = field(repr=False)
 
 
 def face_warnings(flat: int) -> tuple[str, ...]:
-    """What to say of so many faces without area."""
+    """The warning, in a tuple, that so many faces are `flat`, without area; an empty tuple for none."""
     return (f"{flat} {'face has' if flat == 1 else 'faces have'} zero area",) if flat else ()

@@ -5,10 +5,13 @@ The operator, the panel, the command line and the Python API are all made from t
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from .errors import SettingsError
+
+# Annotations must not be postponed in this module: the command line and Blender's properties read `field.type`.
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,20 @@ class Choice:
     description: str
 
 
-def setting(default, label, description, *, range=None, soft_range=None, choices=()):
+def setting(
+    default: str | bool | int | float,
+    label: str,
+    description: str,
+    *,
+    range: tuple[float, float] | None = None,
+    soft_range: tuple[float, float] | None = None,
+    choices: Sequence[Choice] = (),
+) -> Any:
+    """The dataclass field of one setting, with all that its users need to know of it in `metadata`.
+
+    `range` has the least and the largest number, `soft_range` those that a slider shows.  The default has the setting's
+    own type.
+    """
     metadata = dict(label=label, description=description, range=range, soft_range=soft_range or range, choices=choices)
     return dataclasses.field(default=default, metadata=metadata)
 
@@ -113,7 +129,7 @@ class Settings:
         soft_range=(0.0, 0.01),
     )
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             check(field, getattr(self, field.name))
 
@@ -124,7 +140,7 @@ class Settings:
                 raise SettingsError(text.format(self))
 
 
-# What does not go with what, and what to do then
+# Tests of settings for what excludes each other, and the message of each, formatted with the settings
 _EXCLUDED: tuple[tuple[Callable[[Settings], bool], str], ...] = (
     (
         lambda its: its.weights == "MEAN_VALUE" and its.balance > 0.5,
@@ -141,18 +157,19 @@ _EXCLUDED: tuple[tuple[Callable[[Settings], bool], str], ...] = (
 )
 
 
-def check(field, value):
-    meta = field.metadata
+def check(field: dataclasses.Field, value: Any) -> None:
+    """Raise `SettingsError` if the setting of a `field` made by `setting` cannot have this value."""
+    meta, kind = field.metadata, type(field.default)  # not `field.type`: a string where annotations are postponed
     if meta["choices"]:
         names = [choice.identifier for choice in meta["choices"]]
         if value not in names:
             raise SettingsError(f"{field.name} is {value!r}: choose one of {', '.join(names)}")
-    elif field.type is bool:
+    elif kind is bool:
         if value not in (True, False):
             raise SettingsError(f"{field.name} is {value!r}: choose True or False")
     else:
         low, high = meta["range"]
         # A value that is no number lies in no range.
-        if not (low <= value <= high and (field.type is not int or value == int(value))):
-            kind = "a whole number" if field.type is int else "a number"
-            raise SettingsError(f"{field.name} is {value!r}: choose {kind} from {low} to {high}")
+        if not (low <= value <= high and (kind is not int or value == int(value))):
+            wanted = "a whole number" if kind is int else "a number"
+            raise SettingsError(f"{field.name} is {value!r}: choose {wanted} from {low} to {high}")

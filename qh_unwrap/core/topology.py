@@ -9,15 +9,16 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import errors
 from .pieces import components, first_and_last, numbers
 
-_KEYS = 2_000_000  # vertices: three numbers below it go into one number of 64 bits
+_KEYS = 2_000_000  # vertices, up to which the numbers of three go into one number of 64 bits
 
 
 class Topology:
-    """The connections of triangles.  Anything can be asked of any triangles; nothing raises.
+    """The connections of triangles.  Everything can be asked of whatever triangles there are; nothing raises.
 
     Parameters
     ----------
@@ -49,6 +50,7 @@ class Topology:
 
     @property
     def piece_count(self) -> int:
+        """How many pieces there are, p."""
         return len(self.vertex_starts)
 
     @property
@@ -123,7 +125,7 @@ class Topology:
 
     @cached_property
     def component_counts(self) -> np.ndarray:
-        """(p,), of how many parts, not linked by an edge, the triangles of each piece consist."""
+        """(p,), how many parts each piece has whose triangles share no edges."""
         m = len(self.triangles)
         first, second = self.twins
         part = components(m, first % m, second % m)[1]
@@ -131,7 +133,8 @@ class Topology:
 
     @cached_property
     def _traced(self) -> tuple[list[np.ndarray], np.ndarray]:
-        """The loops that can be followed, and the pieces (p,) of which some cannot: where several begin at a vertex."""
+        """The loops of all pieces in which these can be told apart, and the other pieces, (p,) bool: those are crowded,
+        misaligned, or several loops pass through one vertex."""
         start, end = (ends[self.on_boundary] for ends in self.half_edges)
         tangled = np.zeros(self.piece_count, bool)
         tangled[self.vertex_piece[self.edges[self.crowded | self.misaligned].ravel()]] = True
@@ -190,6 +193,10 @@ class Topology:
         found: dict[int, errors.SurfaceError] = {}
 
         def note(at_fault, of_piece, message, triangles=None):
+            """Keep the fault of every piece that has something `at_fault`, (x,) bool, and that has no earlier fault.
+
+            `of_piece` (x,) is the piece of each such thing, `triangles` (m,) bool are those to name.
+            """
             for k in np.unique(of_piece[at_fault]).tolist():
                 if k not in found:
                     mine = None if triangles is None else triangles & (self.triangle_piece == k)
@@ -251,8 +258,8 @@ def _pinched(number, triangles):
     return errors.NonManifoldVertexError(text, triangles)
 
 
-def checked_arrays(vertices, triangles) -> tuple[np.ndarray, np.ndarray]:
-    """Both as arrays of finite floats (n, 3) and of indices (m, 3); raises `SurfaceError`."""
+def checked_arrays(vertices: ArrayLike, triangles: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Both as arrays, of finite floats (n, 3) and of indices (m, 3); raises `SurfaceError`."""
     try:
         vertices = np.asfortranarray(vertices, dtype=np.float64)
         indices = np.asarray(triangles)
@@ -290,4 +297,5 @@ def edge_keys(triangles: np.ndarray, n: int) -> np.ndarray:
 
 
 def count(number: int, one: str, more: str) -> str:
+    """The number and its noun: `one` for 1, else `more`."""
     return f"{number} {one if number == 1 else more}"

@@ -1,43 +1,53 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Arithmetic on many triangles at once.
 
-It is fastest where neighbours in memory are alike.  So corners, arrays (m, 3, d), are kept in memory coordinate by
-coordinate, and fields, which have the triangles in the last axis, are worked on a part at a time.
+It is fastest where neighbours in memory are alike.  So the points at the corners of triangles, arrays (m, 3, d), are
+kept in memory coordinate by coordinate: transposed, (d, 3, m), they are contiguous.  A field is an array that has the
+triangles in its last axis, (..., m); fields are worked on a part of the triangles at a time.
 """
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-_AT_ONCE = 8192  # triangles, or entries of a matrix: what is at work stays in the processor's cache
-# A triangle lower than this part of its longest edge has no area, for all that single precision can tell.
-_FLATTEST = 1e-6
-# It is laid out with this part as its height: enough to stay valid in a map, too little to bend it.
-_THICKENED = 1e-2
+_AT_ONCE = 8192  # triangles, or entries of a matrix, in a part: what is made of them stays in the processor's cache
+_FLATTEST = 1e-6  # height, relative to its longest edge, below which a triangle has no area in single precision
+_THICKENED = 1e-2  # height, relative to its longest edge, that it gets: enough to stay valid, too little to bend a map
 
 
-def parts(count):
-    """Slices of so many triangles, one after the other."""
+def parts(count: int) -> list[slice]:
+    """The parts, slices of at most `_AT_ONCE`, that so many triangles are worked on in."""
     return [slice(start, min(start + _AT_ONCE, count)) for start in range(0, count, _AT_ONCE)]
 
 
-def by_parts(function, *fields):
-    """`function(*fields)`, a field or a tuple of some, worked out for a part of the triangles after the other."""
+def by_parts(function: Callable[..., Any], *fields: np.ndarray) -> Any:
+    """`function(*fields)`, a field or a tuple of fields, where that treats every triangle by itself.
+
+    It is worked out for one part of the triangles after the other: so the many arrays that the function makes on the
+    way are small enough for the processor's cache, and only its results are as long as the fields.
+    """
     count = fields[0].shape[-1]
     if count <= _AT_ONCE:
         return function(*fields)
-    results = None
+    results: list[np.ndarray] = []
     for part in parts(count):
         found = function(*(field[..., part] for field in fields))
         several = isinstance(found, tuple)
-        if results is None:
-            results = [np.empty((*each.shape[:-1], count), each.dtype) for each in (found if several else (found,))]
-        for result, each in zip(results, found if several else (found,), strict=True):
+        found = found if several else (found,)
+        results = results or [np.empty((*each.shape[:-1], count), each.dtype) for each in found]
+        for result, each in zip(results, found, strict=True):
             result[..., part] = each
     return tuple(results) if several else results[0]
 
 
-def sums_by_parts(function, starts, *fields):
-    """The sums (r, p) of the field `function(*fields)` (r, m) over the triangles from each of the `starts` (p,)."""
-    sums = 0
+def sums_by_parts(function: Callable[..., np.ndarray], starts: np.ndarray, *fields: np.ndarray) -> np.ndarray:
+    """The sums (r, p) of the field `function(*fields)` (r, m) over each piece; those begin at the `starts` (p,).
+
+    Like `by_parts`, but the field itself is never as long as the others.  A piece may begin in one part and end in
+    another: each part adds what it has of every piece that it meets.
+    """
+    sums = np.zeros(())
     for part in parts(fields[0].shape[-1]):
         found = function(*(field[..., part] for field in fields))
         pieces = slice(np.searchsorted(starts, part.start, side="right") - 1, np.searchsorted(starts, part.stop))
@@ -46,10 +56,10 @@ def sums_by_parts(function, starts, *fields):
     return sums
 
 
-def corners_of(points, triangles):
-    """The corners (m, 3, d) of `triangles` (m, 3) with these points (n, d).
+def corners_of(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The points at the corners of the triangles, (m, 3, d), of `points` (n, d) and `triangles` (m, 3).
 
-    Points that are asked for a part at a time are best kept coordinate by coordinate as well.
+    Points that are used for one part after another are best kept coordinate by coordinate as well.
     """
     corner = triangles.T
     corners = np.empty((points.shape[1], *corner.shape))
@@ -58,50 +68,46 @@ def corners_of(points, triangles):
     return corners.T
 
 
-def box(points):
-    """The lower corner and the size, (d,) each, of the smallest box around points (n, d)."""
-    low, high = (np.array([extreme(values) for values in points.T]) for extreme in (np.min, np.max))
-    return low, high - low
-
-
-def signed_areas(corners):
-    """Signed areas of plane triangles (m, 3, 2), positive counter-clockwise."""
+def signed_areas(corners: np.ndarray) -> np.ndarray:
+    """Signed areas (m,) of plane triangles (m, 3, 2), positive counter-clockwise."""
     (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     return 0.5 * (ax * by - ay * bx)
 
 
-def normals(corners):
-    """Normals of triangles in space (m, 3, 3), twice as long as their areas, (m, 3)."""
+def normals(corners: np.ndarray) -> np.ndarray:
+    """Normals (m, 3) of triangles in space (m, 3, 3), as long as twice their areas."""
     (ax, ay, az), (bx, by, bz) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]).T
 
 
-def areas_in_space(points, triangles):
+def areas_in_space(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Areas (m,) of triangles (m, 3) with points (n, 3)."""
     points = np.asfortranarray(points)
-    return by_parts(lambda corner: 0.5 * np.linalg.norm(normals(corners_of(points, corner.T)), axis=1), triangles.T)
+    return by_parts(lambda part: 0.5 * np.linalg.norm(normals(corners_of(points, part.T)), axis=1), triangles.T)
 
 
-def laid_flat(points, triangles, size):
-    """Triangles of points (n, 3) laid isometrically in the plane, counter-clockwise: their corners (m, 3, 2).
+def laid_flat(points: np.ndarray, triangles: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """The triangles (m, 3) of points (n, 3) laid into the plane in their true shape, counter-clockwise, (m, 3, 2).
 
-    Also which of them are too flat (m,), and were given a height.  `size` is an edge's length, by and large.
+    Also returns which of them are too flat, (m,) bool: these get a height.  `size` is the length of an edge, by and
+    large; no longest edge counts as shorter than a small part of it.
     """
     shortest = _FLATTEST * size
 
-    def laid(corner):
-        corners = corners_of(points, corner.T)
+    def laid(corner_vertex):
+        corners = corners_of(points, corner_vertex.T)
         sides = np.roll(corners, -1, axis=1) - corners
         squares = (sides * sides).sum(axis=2).T
         base = np.argmax(squares, axis=0)
         longest = np.maximum(np.sqrt(squares.max(axis=0)), shortest)
-        # How far along the base the third corner lies, and how high above it
+        # How far along its longest edge, the base, the third corner lies, and how high above it
         products = -(sides * np.roll(sides, 1, axis=1)).sum(axis=2).T
         along = np.choose(base, products) / longest
         height = np.linalg.norm(normals(corners), axis=1) / longest
         degenerate = height < _FLATTEST * longest
         height = np.where(degenerate, _THICKENED * longest, height)
-        flat = np.zeros((2, *corner.shape))
+        flat = np.zeros((2, *corner_vertex.shape))
+        # The base begins at the origin, with that corner that has the number `base`.
         for c, (x, y) in enumerate(flat.swapaxes(0, 1)):
             second, third = base == (c + 2) % 3, base == (c + 1) % 3
             x[second], x[third], y[third] = longest[second], along[third], height[third]
@@ -111,17 +117,21 @@ def laid_flat(points, triangles, size):
     return flat.T, degenerate
 
 
-def hat_gradients(corners):
-    """Gradients of the hat functions of the second and third corners of plane triangles (m, 3, 2), (2, 2, m)."""
+def hat_gradients(corners: np.ndarray) -> np.ndarray:
+    """Gradients of the hat functions of plane triangles' (m, 3, 2) second and third corners, (2, 2, m).
+
+    The first axis is the corner, the second the coordinate, the last the triangle.  The first corner's gradient is
+    missing, since all three sum to zero.
+    """
     (a, c), (b, d) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     det = a * d - b * c
     return np.array([[d / det, -b / det], [-c / det, a / det]])
 
 
-def corner_angles(corners):
+def corner_angles(corners: np.ndarray) -> np.ndarray:
     """Interior angles of plane triangles (m, 3, 2), at each corner (m, 3), in radians."""
 
-    def angles(corners):
+    def angles(corners):  # (2, 3, m)
         ahead = np.roll(corners, -1, axis=1) - corners
         back = np.roll(corners, 1, axis=1) - corners
         cross = ahead[0] * back[1] - ahead[1] * back[0]

@@ -1,25 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Edge weights that discretise div(M grad f) = 0, and the schemes that make them from a map.
 
-Weights are a (2, k) array over a chart's `edges` (i, j): row 0 is the weight of j in the equation of i, row 1 the weight
-of i in the equation of j.  In all equations `sum_j w_ij (f_i - f_j) = 0` (eq. 2).
+Weights are a (2, k) array over a chart's `edges` (i, j): row 0 is the weight of j in the equation of i, row 1 that of
+i in the equation of j.  In all equations `sum_j w_ij (f_i - f_j) = 0` (eq. 2).
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .tensor import area_scale, jacobian, plane_tensor, scalar_tensor, squared_stretches, surface_tensor
 from .triangles import by_parts, corners_of, signed_areas
 
+if TYPE_CHECKING:
+    from .chart import Chart
+    from .settings import Settings
 
-def uniform(chart):
-    """Tutte's weights: every edge 1."""
+
+def uniform(chart: Chart) -> np.ndarray:
+    """Tutte's weights: 1 for every edge."""
     return np.ones((2, len(chart.edges)))
 
 
-def cotangent(chart, tensor=None, corners=None):
-    """Finite element weights on the triangles `corners` (m, 3, 2), the chart's own by default, eq. (12).
+def cotangent(chart: Chart, tensor: np.ndarray | None = None, corners: np.ndarray | None = None) -> np.ndarray:
+    """Finite element weights, eq. (12), with a tensor (3, m) in every triangle; None, the identity, gives cotangents.
 
-    `tensor` (3, m) is constant on each triangle; None is the identity, which gives the cotangents.
+    The triangles have the shapes `corners` (m, 3, 2), by default those that the chart has at rest.
     """
     corners = chart.rest if corners is None else corners
     area = np.abs(signed_areas(corners))
@@ -41,11 +50,12 @@ def cotangent(chart, tensor=None, corners=None):
     return np.stack([w, w])
 
 
-def mean_value(chart, tensor=None, corners=None):
-    """Mean value weights on the triangles `corners` (m, 3, 2), the chart's own by default.
+def mean_value(chart: Chart, tensor: np.ndarray | None = None, corners: np.ndarray | None = None) -> np.ndarray:
+    """Mean value weights; always positive, if the tensors are positive definite.
 
-    `tensor` (3, m) gives appendix A of the paper, (m,) the scalar kappa of eq. (15), None those of Floater 2003.
-    Always positive for positive definite tensors.  Flipped triangles count by their absolute angles.
+    With tensors (3, m) they are those of the paper's appendix A, with scalars (m,) those with the kappa of eq. (15),
+    with None those of Floater 2003.  The triangles have the shapes `corners` (m, 3, 2), by default those that the chart
+    has at rest; flipped ones count by their absolute angles.
     """
     corners = chart.rest if corners is None else corners
     edge = np.roll(corners, -1, axis=1) - corners
@@ -72,7 +82,7 @@ def mean_value(chart, tensor=None, corners=None):
 
 
 def _in_edge_frame(tensor, ex, ey, side):
-    # The tensor in the frame along each edge whose normal points into the triangle, (3, m) each.
+    """The tensor's a, b, c, (3, m) each, in the frame of each edge, whose second axis points into the triangle."""
     a, b, c = tensor
     nx, ny = -ey * side, ex * side
     return (
@@ -83,11 +93,12 @@ def _in_edge_frame(tensor, ex, ey, side):
 
 
 def _appendix_a(a, b, c, sin, tan_half):
+    """The part of an edge's weight, before division by its length, that a triangle has; all are (3, m)."""
     return ((a + 2 * b + 2 * c * sin) * tan_half + (a - b) * sin) / 3
 
 
 def _directed(chart, at_start, at_end):
-    # Sum the weights that half-edges (3, m) give to the equations of their start and of their end.
+    """The weights (2, k), from what every half-edge (3, m) adds in the equations of its start and of its end."""
     start, end = chart.half_edges
     edge, k = chart.half_edge_edges, len(chart.edges)
     forward = start < end
@@ -101,15 +112,16 @@ def _directed(chart, at_start, at_end):
 
 
 class Stretch:
-    """The weights of Yoshizawa, Belyaev, Seidel 2004: mean value weights, each w_ij divided by the stretch at j
-    after every solve, for ever.
+    """The weights of Yoshizawa, Belyaev, Seidel 2004: mean value weights at first; after every solve, each w_ij is
+    divided by the stretch at j, and stays so.
     """
 
-    def __init__(self):
-        self._weights = {}
+    def __init__(self) -> None:
+        self._weights: dict[Chart, np.ndarray] = {}
 
-    def __call__(self, chart, uv):
-        weights = self._weights.get(id(chart))
+    def __call__(self, chart: Chart, uv: np.ndarray) -> np.ndarray:
+        """The next weights (2, k) after the chart's map `uv` (n, 2)."""
+        weights = self._weights.get(chart)
         if weights is None:
             weights = mean_value(chart)
         larger, smaller, *_ = squared_stretches(chart, uv)
@@ -119,14 +131,14 @@ class Stretch:
         total = np.maximum(np.bincount(corner, area), np.finfo(float).tiny)
         stretch = np.sqrt(np.bincount(corner, area * squared) / total)
         i, j = chart.edges.T
-        self._weights[id(chart)] = weights / np.stack([stretch[j], stretch[i]])
-        return self._weights[id(chart)]
+        self._weights[chart] = weights / np.stack([stretch[j], stretch[i]])
+        return self._weights[chart]
 
 
-def scheme(settings):
-    """The function of charts and a map `uv` (n, 2) that makes each chart's next weights, as the settings choose.
+def scheme(settings: Settings) -> Callable[[Sequence[Chart], np.ndarray], list[np.ndarray]]:
+    """The function that the settings choose: from charts and their map `uv` (n, 2) to the next weights of each chart.
 
-    Air is as good as it lies: its tensor is the identity.
+    Air has its rest shape as it lies in the map, and so no distortion: its tensor is the identity.
     """
     t, q = settings.balance, settings.tensor_power
     stretch = Stretch()
@@ -139,14 +151,13 @@ def scheme(settings):
             return mean_value(chart, None, chart.shapes(uv))
         if settings.weights == "STRETCH":
             return stretch(chart, uv)
-        tensor = plane_tensor if settings.weights == "MEAN_VALUE" else scalar_tensor
-        return mean_value(chart, tensor(chart, uv, t, q, scale), corners_of(uv, chart.triangles))
+        make_tensor = plane_tensor if settings.weights == "MEAN_VALUE" else scalar_tensor
+        return mean_value(chart, make_tensor(chart, uv, t, q, scale), corners_of(uv, chart.triangles))
 
     def of_all(charts, uv):
-        # Charts beside the island have its scale, if they are no air, which has none.
-        scale = (
-            area_scale(charts[0], jacobian(charts[0], uv)) if any(not chart.is_air for chart in charts[1:]) else None
-        )
+        island, *others = charts
+        # Charts beside the island, unless they are air, count with the island's scale and not with their own.
+        scale = None if all(chart.is_air for chart in others) else area_scale(island, jacobian(island, uv))
         return [of(chart, uv, scale) for chart in charts]
 
     return of_all
