@@ -85,7 +85,7 @@ def _parser():
 def _argument(field):
     meta = field.metadata
     description = meta["description"].replace("%", "%%")
-    if field.type is bool:
+    if type(field.default) is bool:
         return dict(action=argparse.BooleanOptionalAction, default=field.default, help=description)
     if meta["choices"]:
         names = [choice.identifier for choice in meta["choices"]]
@@ -94,7 +94,7 @@ def _argument(field):
         return dict(type=str.upper, choices=names, metavar="NAME", default=field.default, help=help)
     low, high = meta["range"]
     help = f"{description} ({low:g} to {high:g}, default {field.default:g})"
-    return dict(type=field.type, metavar="NUMBER", default=field.default, help=help)
+    return dict(type=type(field.default), metavar="NUMBER", default=field.default, help=help)
 
 
 def _run(args):

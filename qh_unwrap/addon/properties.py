@@ -15,11 +15,11 @@ def _property(field, options=frozenset()):
     if meta["choices"]:
         items = [(choice.identifier, choice.label, choice.description) for choice in meta["choices"]]
         return bpy.props.EnumProperty(items=items, **common)
-    if field.type is bool:
+    if type(field.default) is bool:
         return bpy.props.BoolProperty(**common)
     (low, high), (soft_low, soft_high) = meta["range"], meta["soft_range"]
     limits = dict(min=low, max=high, soft_min=soft_low, soft_max=soft_high)
-    if field.type is int:
+    if type(field.default) is int:
         return bpy.props.IntProperty(**limits, **common)
     subtype = 'FACTOR' if (soft_low, soft_high) == (0, 1) else 'NONE'  # a slider
     return bpy.props.FloatProperty(precision=4 if soft_high < 1 else 3, subtype=subtype, **limits, **common)

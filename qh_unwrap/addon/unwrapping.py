@@ -14,6 +14,7 @@ from ..core.errors import BoundaryError, UVError
 from ..core.islands import attached, find_islands
 from ..core.pieces import joined, numbers
 from ..core.stepping import mapped
+from ..core.triangles import areas_in_space
 from . import layout, mesh_arrays
 from .options import MeshOptions
 from .outcome import Outcome, count, latest
@@ -164,7 +165,7 @@ def _judge(works):
 
 def _judge_drawn(work, sign):
     """Count the flips and collapses of an island's faces in the triangles that Blender draws."""
-    has_area = placing.areas_of_triangles(work.vertices, work.drawn) > 0
+    has_area = areas_in_space(work.vertices, work.drawn) > 0
     flips, collapsed = int((sign < 0).sum()), int(((sign == 0) & has_area).sum())
     work.outcome.after = dataclasses.replace(work.outcome.after, flips=flips, collapsed=collapsed)
     if flips or collapsed:

@@ -201,7 +201,7 @@ class Held:
         """Whether no air takes part."""
         return not any(chart.is_air for chart in self.charts)
 
-    def fix(self, fixed, uv):
+    def fix(self, fixed: Fixed, uv: np.ndarray) -> None:
         self._fixed = fixed
         added = len(uv) - len(fixed.held)
         self.constrained = self.constrained.refixed(*fixed.followed_by(np.zeros(added, bool), np.zeros((added, 2))))
@@ -212,18 +212,18 @@ class Held:
             return uv
         return np.vstack([uv, *(uv[loop].mean(axis=0) for loop in self.island.holes)])
 
-    def renewed(self, uv):
+    def renewed(self, uv: np.ndarray) -> np.ndarray:
         return uv
 
-    def recalled(self, uv, earlier, pieces):
+    def recalled(self, uv: np.ndarray, earlier: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         chosen = pieces[self.island.vertex_piece][:, None]
         n = len(self.island.vertices)
         return self.start(np.where(chosen, earlier, uv[:n])), np.zeros(len(pieces), bool)
 
-    def weights(self, of_charts, _uv):
+    def weights(self, of_charts: Sequence[np.ndarray], _uv: np.ndarray) -> np.ndarray:
         return self.triangles.joined(of_charts)
 
-    def of(self, pieces, uv):
+    def of(self, pieces: np.ndarray, uv: np.ndarray) -> tuple[Held, np.ndarray]:
         number = self.island.numbering(pieces)
         island = self.island.of(pieces, number)
         fixed = self._fixed.of(pieces[self.island.vertex_piece], number)
@@ -308,7 +308,7 @@ class Plane:
         like = beside[cKDTree((uv + shift)[beside]).query((uv + shift)[n:])[1]]
         return dissection.extended(like, self.triangles.edges[(self.triangles.edges >= n).any(axis=1)]).order
 
-    def fix(self, fixed, uv):
+    def fix(self, fixed: Fixed, uv: np.ndarray) -> None:
         n = len(fixed.held)
         on_circle = np.concatenate([air.on_circle for air in self._airs])
         self._fixed = fixed
@@ -318,13 +318,13 @@ class Plane:
         """The island's map (n, 2) with the air's vertices where they were when the air was made."""
         return np.vstack([uv[: len(self.island.vertices)], *(air.points for air in self._airs)])
 
-    def renewed(self, uv):
+    def renewed(self, uv: np.ndarray) -> np.ndarray:
         now = quality(corners_of(uv, self._air.triangles))
         worn = np.zeros(self.island.piece_count, bool)
         worn[self._air.piece[~(now > _WORN * self._quality)]] = True
         return self._remade(uv, worn)[0] if worn.any() else uv
 
-    def recalled(self, uv, earlier, pieces):
+    def recalled(self, uv: np.ndarray, earlier: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         chosen = pieces[self.island.vertex_piece][:, None]
         n = len(self.island.vertices)
         uv = np.vstack([np.where(chosen, earlier, uv[:n]), uv[n:]])
@@ -348,7 +348,7 @@ class Plane:
         n = len(self.island.vertices)
         return self._airs[k]._replace(points=uv[n:][self.vertex_piece[n:] == k])
 
-    def weights(self, of_charts, uv):
+    def weights(self, of_charts: Sequence[np.ndarray], uv: np.ndarray) -> np.ndarray:
         """The island's are multiplied by the factor that lets it press on the air as the air presses on it.
 
         Without it the island would grow or shrink for ever; where the map is an isometry it is 1.
@@ -361,7 +361,7 @@ class Plane:
         factor = np.where((area > 0) & (energy > 0), 2 * area / np.where(energy > 0, energy, 1), 1.0)
         return self.triangles.joined([of_charts[0] * factor[piece], *of_charts[1:]])
 
-    def of(self, pieces, uv):
+    def of(self, pieces: np.ndarray, uv: np.ndarray) -> tuple[Plane, np.ndarray]:
         number = self.island.numbering(pieces)
         chosen = pieces[self.island.vertex_piece]
         smaller = Plane(

@@ -11,13 +11,13 @@ _LEAF = 16  # vertices: so few are not divided any further
 FEW = 300  # vertices whose order hardly matters
 
 
-def banded(n, edges):
+def banded(n: int, edges: np.ndarray) -> np.ndarray:
     """An elimination order (n,) that suits a small graph, or many of them: neighbours come soon after one another."""
     graph = coo_array((np.ones(len(edges), np.int8), tuple(edges.T)), shape=(n, n))
     return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
 
 
-def nested_dissection(points, edges, group=None):
+def nested_dissection(points: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
     """An elimination order (n,) with little fill, by recursive bisection of `points` (n, d).
 
     No edge may join vertices of two groups; `group` (n,) numbers that of each vertex, by default one for all.

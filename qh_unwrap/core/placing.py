@@ -123,11 +123,6 @@ def areas(islands: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     return np.add.reduceat(areas_in_space(points, triangles), starts)
 
 
-def areas_of_triangles(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The areas in space (t,) of triangles (t, 3) with vertices (n, 3)."""
-    return areas_in_space(vertices, triangles)
-
-
 def uv_areas(islands: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """The areas in the layout, (k,), of islands given as (uv, triangles)."""
     uv, triangles, _, starts = joined(*zip(*islands, strict=True))

@@ -5,13 +5,12 @@ The operator, the panel, the command line and the Python API are all made from t
 """
 
 import dataclasses
+import numbers
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from .errors import SettingsError
-
-# Annotations must not be postponed in this module: the command line and Blender's properties read `field.type`.
 
 
 @dataclass(frozen=True)
@@ -159,7 +158,7 @@ _EXCLUDED: tuple[tuple[Callable[[Settings], bool], str], ...] = (
 
 def check(field: dataclasses.Field, value: Any) -> None:
     """Raise `SettingsError` if the setting of a `field` made by `setting` cannot have this value."""
-    meta, kind = field.metadata, type(field.default)  # not `field.type`: a string where annotations are postponed
+    meta, kind = field.metadata, type(field.default)
     if meta["choices"]:
         names = [choice.identifier for choice in meta["choices"]]
         if value not in names:
@@ -169,7 +168,8 @@ def check(field: dataclasses.Field, value: Any) -> None:
             raise SettingsError(f"{field.name} is {value!r}: choose True or False")
     else:
         low, high = meta["range"]
-        # A value that is no number lies in no range.
-        if not (low <= value <= high and (kind is not int or value == int(value))):
+        is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
+        # NaN lies in no range.
+        if not (is_number and low <= value <= high and (kind is not int or value == int(value))):
             wanted = "a whole number" if kind is int else "a number"
             raise SettingsError(f"{field.name} is {value!r}: choose {wanted} from {low} to {high}")

@@ -264,7 +264,7 @@ def checked_arrays(vertices: ArrayLike, triangles: ArrayLike) -> tuple[np.ndarra
         vertices = np.asfortranarray(vertices, dtype=np.float64)
         indices = np.asarray(triangles)
         triangles = np.asfortranarray(indices, dtype=np.int64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise errors.ShapeError(f"vertices and triangles must be arrays of numbers: {error}") from None
     if vertices.ndim != 2 or vertices.shape[1] != 3:
         raise errors.ShapeError(f"vertices must have the shape (n, 3), not {vertices.shape}")

@@ -11,8 +11,8 @@ import pytest
 from scenes import add_cube, add_grid, changes, edit_mode, mesh_object, snapshot, uvs
 
 from qh_unwrap.addon import files, mesh_arrays, operators
-from qh_unwrap.core import memory
 from qh_unwrap.addon.outcome import summary
+from qh_unwrap.core import memory
 
 _MESHES = os.environ.get("QH_MESHES")
 

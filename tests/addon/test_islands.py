@@ -2,9 +2,9 @@
 import numpy as np
 import pytest
 
+from qh_unwrap.core.chart import Surface
 from qh_unwrap.core.errors import DuplicateError, WindingError
 from qh_unwrap.core.islands import attached, cuts, find_islands
-from qh_unwrap.core.chart import Surface
 
 
 def mesh(faces, seams=()):

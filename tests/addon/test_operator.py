@@ -372,11 +372,11 @@ def test_operator_has_every_setting():
     assert [name for name in properties.keys() if name != "rna_type"] == [field.name for field in _FIELDS]  # noqa: SIM118
     for field in _FIELDS:
         found, meta = properties[field.name], field.metadata
-        default = pytest.approx(field.default) if field.type is float else field.default
+        default = pytest.approx(field.default) if type(field.default) is float else field.default
         assert (found.default, found.name, found.description) == (default, meta["label"], meta["description"])
         if meta["choices"]:
             assert [item.identifier for item in found.enum_items] == [choice.identifier for choice in meta["choices"]]
-        elif field.type is not bool:
+        elif type(field.default) is not bool:
             assert (found.hard_min, found.hard_max) == pytest.approx(meta["range"])
             assert (found.soft_min, found.soft_max) == pytest.approx(meta["soft_range"])
 

@@ -6,8 +6,8 @@ from scenes import add_grid, edit_mode, mesh_object, uvs
 from scipy.spatial import Delaunay
 
 from qh_unwrap.addon import operators
-from qh_unwrap.core import placing
 from qh_unwrap.addon.outcome import sentences, summary
+from qh_unwrap.core import placing
 
 
 def set_uvs(obj, values):

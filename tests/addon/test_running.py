@@ -14,7 +14,8 @@ from scenes import add_cube, add_grid, changes, edit_mode, snapshot, uvs
 from qh_unwrap.addon import operators, running, selection, unwrapping
 from qh_unwrap.addon.options import MeshOptions
 from qh_unwrap.addon.running import InSteps, Run
-from qh_unwrap.core import Settings, unwrapping as driver
+from qh_unwrap.core import Settings
+from qh_unwrap.core import unwrapping as driver
 
 TIMER = SimpleNamespace(type='TIMER', value='NOTHING')
 ESC = SimpleNamespace(type='ESC', value='PRESS')
