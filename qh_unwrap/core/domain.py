@@ -186,10 +186,11 @@ class Held:
         self.charts: Sequence[Chart] = [island]
         self.vertex_piece = island.vertex_piece
         points = island.vertices
+        self.points = points
         if plugs is not None:
             chart, centres = plugs
             self.charts = [island, chart]
-            points = np.vstack([points, centres])
+            self.points = points = np.vstack([points, centres])
             self.vertex_piece = np.concatenate([self.vertex_piece, island.hole_piece])
             fixed = fixed.followed_by(np.zeros(len(centres), bool), np.zeros((len(centres), 2)))
         self.triangles = Triangles(self.charts, len(points))

@@ -10,15 +10,18 @@ import numpy as np
 
 from .boundary import held_outlines
 from .certificate import certified_pieces, wrong_pieces
-from .chart import Surface
+from .chart import Surface, perimeter
 from .domain import Fixed, Held
 from .energy import energies
 from .initial import conformal, fit, project, weighted_map
+from .rings import ring_map
 from .settings import Settings
 from .triangles import corners_of, signed_areas
 
 # The starts to choose from, the cheapest first, and the energy that needs no further one
-_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "MEAN_VALUE": np.inf}
+_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "RINGS": 1000, "MEAN_VALUE": np.inf}
+# A surface bulges if its outline is so short: then neither its projection nor its conformal map is any good.
+_BULGING = 0.45  # of the squared outline, relative to that of a disk of the surface's area
 
 
 def natural_start(surface: Surface, settings: Settings, initial: str) -> np.ndarray:
@@ -33,36 +36,47 @@ def natural_start(surface: Surface, settings: Settings, initial: str) -> np.ndar
     held, values, _, faults = held_outlines(surface, circle, np.zeros((n, 2)), nothing, np.zeros((n, 2), bool))
     for fault in faults.values():
         raise fault
-    return weighted_map(Held(surface, Fixed(held, values), surface.plugs(solid=True)), initial)[:n]
+    domain = Held(surface, Fixed(held, values), surface.plugs(solid=True))
+    return _weighted_or_ring_map(domain, initial)[:n]
+
+
+def _weighted_or_ring_map(domain, initial):
+    return ring_map(domain) if initial == "RINGS" else weighted_map(domain, initial)
 
 
 def best_start(surface: Surface, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
-    """Of the certified natural maps of every piece a good one, or that of least energy; if there is none, the last.
+    """Of the certified natural maps of every piece a good one, or that of least energy; where none is certified, of all.
 
     Returns the map (n, 2), and for which pieces (p,) it is certified.
     """
-    n = len(surface.vertices)
-    start, least = np.zeros((n, 2)), np.full(surface.piece_count, np.inf)
-    open_pieces = np.ones(surface.piece_count, bool)
+    start, least = np.zeros((len(surface.vertices), 2)), np.full(surface.piece_count, np.inf)
+    certified, undecided = np.zeros(surface.piece_count, bool), np.ones(surface.piece_count, bool)
+    bulging = np.array([perimeter(surface.vertices[loop]) ** 2 < _BULGING * 4 * np.pi for loop in surface.outlines])
+    untried = undecided.copy()
     for initial, enough in _CANDIDATES.items():
-        whole = open_pieces.all()
-        part = surface if whole else surface.of(open_pieces)
+        trying = undecided & ~bulging if initial in ("PROJECTION", "CONFORMAL") else undecided
+        if not trying.any():
+            continue
+        pieces = np.flatnonzero(trying)
+        part = surface if trying.all() else surface.of(trying)
         uv = natural_start(part, settings, initial)
         value = energies(part, uv, settings.balance)
-        better = value < least[open_pieces]
-        if better.any():
-            better &= certified_pieces(part, uv)
-        pieces = np.flatnonzero(open_pieces)
-        least[pieces[better]] = value[better]
-        # The last serves where none is certified.
-        taken = better | ~np.isfinite(least[open_pieces])
-        rows = np.flatnonzero(open_pieces[surface.vertex_piece])
-        its = taken[part.vertex_piece]
+        # What could be better is worth the certificate.
+        sure = (value < least[pieces]) | ~certified[pieces]
+        if sure.any():
+            sure &= certified_pieces(part, uv)
+        better = np.where(sure == certified[pieces], value < least[pieces], sure)
+        better |= untried[pieces]
+        untried &= ~trying
+        taken = pieces[better]
+        least[taken], certified[taken] = value[better], sure[better]
+        rows = np.flatnonzero(trying[surface.vertex_piece])
+        its = better[part.vertex_piece]
         start[rows[its]] = uv[its]
-        open_pieces &= ~(least < enough)
-        if not open_pieces.any():
+        undecided &= ~(certified & (least < enough))
+        if not undecided.any():
             break
-    return start, np.isfinite(least)
+    return start, certified
 
 
 def with_pins(surface: Surface, start: np.ndarray, uv: np.ndarray, pinned: np.ndarray) -> np.ndarray:
@@ -112,7 +126,11 @@ def start_within(
         # Holes are closed meanwhile, so that nothing folds over them.
         fixed = Fixed(domain.constrained.held[: len(uv)], values)
         solid = domain if domain.is_solid else Held(surface, fixed, surface.plugs(solid=True))
-        start = weighted_map(solid, initial)
+        start = _weighted_or_ring_map(solid, initial)
+        if settings.initial == "AUTO":
+            collapsed = wrong_pieces([surface], start[: len(uv)])
+            if collapsed.any():
+                start = np.where(collapsed[domain.vertex_piece][:, None], ring_map(solid), start)
     if current.any() and initial != "CURRENT":
         start = np.where(current[domain.vertex_piece][:, None], domain.start(uv), start)
     return start
