@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, Delaunay
 
+from qh_unwrap.core.air import make_air
+from qh_unwrap.core.certificate import turn
 from qh_unwrap.core.delaunay import _by_qhull, _Edges, _one_by_one, _scaled, triangulate
-from qh_unwrap.core.exterior import make_air
 from qh_unwrap.core.triangles import corners_of, signed_areas
-from qh_unwrap.core.validity import turn
 
 NO_SIDES = np.empty((0, 2), dtype=int)
 

@@ -10,7 +10,6 @@ import pytest
 from qh_unwrap.core import Settings, Surface, errors, unwrap
 
 from ..benchmarks.common import load_mesh
-from .blender import triangulate
 
 FOLDER = Path(os.environ.get("QH_MESHES", "."))
 pytestmark = pytest.mark.skipif("QH_MESHES" not in os.environ, reason="QH_MESHES names no folder of meshes")
@@ -71,7 +70,7 @@ def test_broken_surfaces_are_named(name, error):
 
 
 def test_zero_area_triangles_of_a_scan_are_survived():
-    result = unwrap(*load_mesh(FOLDER / "broken" / "bad_zero_area_48.obj"), triangulate=triangulate)
+    result = unwrap(*load_mesh(FOLDER / "broken" / "bad_zero_area_48.obj"))
     assert any("zero area" in warning for warning in result.report.warnings)
     assert np.isfinite(result.uv).all() and result.report.after.flips == 0
 
@@ -86,7 +85,7 @@ def test_surfaces_with_holes(name, fill_holes):
 
 @pytest.mark.parametrize("name", DISKS)
 def test_free_boundaries_are_certified(name):
-    result = unwrap(*load_mesh(FOLDER / "disk" / name), triangulate=triangulate)
+    result = unwrap(*load_mesh(FOLDER / "disk" / name))
     assert result.report.injective and result.report.after.flips == 0
     assert result.report.after.symmetric_dirichlet <= result.report.initial.symmetric_dirichlet + 1e-9
 
@@ -95,7 +94,7 @@ def test_free_boundaries_are_certified(name):
     "name, most", [("camel_b.obj", 1.06), ("lilium.obj", 1.01), ("maze.obj", 1.01), ("hemisphere_pmp.off", 1.045)]
 )
 def test_free_boundaries_reach_the_least_distortion(name, most):
-    result = unwrap(*load_mesh(FOLDER / "disk" / name), Settings(iterations=30, refine=0), triangulate=triangulate)
+    result = unwrap(*load_mesh(FOLDER / "disk" / name), Settings(iterations=30, refine=0))
     assert result.report.injective and result.report.after.symmetric_dirichlet < most
 
 
@@ -104,5 +103,5 @@ def test_free_boundaries_reach_the_least_distortion(name, most):
     [("beetle_11loops.off", 1.03), ("capsule_quads_3loops.off", 1.24), ("halftunnel_quads_3loops.off", 1.43)],
 )
 def test_free_boundaries_keep_holes_open(name, most):
-    result = unwrap(*load_mesh(FOLDER / "artist" / name), Settings(iterations=12, refine=0), triangulate=triangulate)
+    result = unwrap(*load_mesh(FOLDER / "artist" / name), Settings(iterations=12, refine=0))
     assert result.report.injective and result.report.after.symmetric_dirichlet < most

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core import Surface, errors
+from qh_unwrap.core.chart import perimeter
 from qh_unwrap.core.triangles import signed_areas
 
 from . import shapes
@@ -96,14 +97,14 @@ def test_triangles_are_laid_out_isometrically():
     vertices, triangles = shapes.bump(3)
     surface = Surface(vertices, triangles)
     for k in range(3):
-        flat = surface.flat[:, k] - surface.flat[:, k - 1]
+        flat = surface.rest[:, k] - surface.rest[:, k - 1]
         solid = surface.vertices[triangles[:, k]] - surface.vertices[triangles[:, k - 1]]
         np.testing.assert_allclose(np.linalg.norm(flat, axis=1), np.linalg.norm(solid, axis=1), rtol=1e-12)
-    assert (signed_areas(surface.flat) > 0).all()
+    assert (signed_areas(surface.rest) > 0).all()
     assert surface.area.sum() == pytest.approx(1, rel=1e-12)
 
 
-def test_loops_follow_the_winding_and_the_longest_comes_first():
+def test_loops_follow_the_winding_and_the_outline_comes_first():
     vertices, triangles = shapes.ring()
     surface = Surface(vertices, triangles)
     assert [len(loop) for loop in surface.loops] == [16, 16]
@@ -114,13 +115,39 @@ def test_loops_follow_the_winding_and_the_longest_comes_first():
         assert all(side in sides for side in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True))
 
 
-def test_filling_closes_every_hole_and_keeps_the_triangles():
+def star_in_a_plate(rays=24):
+    """A square plate with a hole whose rim runs in and out so often that it is longer than the plate's own."""
+    vertices, triangles = shapes.ring(2 * rays, 3)
+    angle = np.pi * np.arange(2 * rays) / rays
+    direction = np.column_stack([np.cos(angle), np.sin(angle)])
+    plate = direction / np.abs(direction).max(axis=1, keepdims=True)
+    star = direction * np.tile([0.2, 0.8], rays)[:, None]
+    between = np.linspace(star, plate, 4, axis=1)
+    return np.column_stack([between.reshape(-1, 2), np.zeros(len(vertices))]), triangles
+
+
+def test_the_outline_is_the_widest_loop_not_the_longest():
+    surface = Surface(*star_in_a_plate())
+    outline, hole = (surface.vertices[loop] for loop in surface.loops)
+    assert perimeter(hole) > 2 * perimeter(outline)
+    assert np.abs(outline).max(axis=1).min() > np.abs(hole).max()
+
+
+@pytest.mark.parametrize("solid", [True, False])
+def test_plugs_close_every_hole_and_keep_the_outline(solid):
     surface = Surface(*shapes.ring())
-    filled = surface.filled()
+    plugs, centres = surface.plugs(solid)
+    assert plugs.is_air != solid and len(centres) == 1
+    points = np.vstack([surface.vertices, centres])
+    filled = Surface(points, np.vstack([surface.triangles, plugs.triangles]))
     assert len(filled.loops) == 1
-    np.testing.assert_array_equal(filled.triangles[: len(surface.triangles)], surface.triangles)
     np.testing.assert_array_equal(filled.loops[0], surface.loops[0])
-    assert filled.filled() is filled
+    assert filled.plugs(solid) is None
+    m = len(surface.triangles)
+    share = filled.area / filled.area[0] * surface.area[0]
+    np.testing.assert_allclose(share[:m], surface.area, rtol=1e-9)
+    if solid:
+        np.testing.assert_allclose(share[m:], plugs.area, rtol=1e-9)
 
 
 def test_zero_area_triangles_are_survived():
@@ -130,4 +157,4 @@ def test_zero_area_triangles_are_survived():
     vertices[triangles[20]] = vertices[triangles[20]].mean(axis=0)  # one that is a point
     surface = Surface(vertices, triangles)
     assert surface.degenerate[5] and surface.degenerate[20]
-    assert (surface.area > 0).all() and np.isfinite(surface.flat).all()
+    assert (surface.area > 0).all() and np.isfinite(surface.rest).all()

@@ -10,13 +10,12 @@ from hypothesis import strategies as st
 
 from qh_unwrap.core import Settings, Surface, UnwrapError, distortion, errors, locality, unwrap, unwrap_steps
 from qh_unwrap.core import triangles as arithmetic
+from qh_unwrap.core.certificate import is_injective
 from qh_unwrap.core.distortion import measure
 from qh_unwrap.core.initial import fit
 from qh_unwrap.core.stepping import finished, mapped
-from qh_unwrap.core.validity import is_injective
 
 from . import shapes
-from .blender import triangulate
 from .test_tensor import seeds
 
 ALL = {
@@ -43,6 +42,8 @@ def pins(kind, surface_vertices, seed=0):
 
 def refusal(initial, boundary, weights, pin, has_uv):
     """The error that a combination must raise, or None."""
+    if not has_uv and initial == "CURRENT" and not (boundary == "FREE" and weights != "COTANGENT"):
+        return errors.UVError
     if boundary in ("CIRCLE", "OUTLINE") and pin != "no pins":
         return errors.PinError
     if boundary == "RECTANGLE" and pin == "inner pins":
@@ -51,7 +52,7 @@ def refusal(initial, boundary, weights, pin, has_uv):
         return errors.SettingsError
     if not has_uv and boundary == "FREE" and pin != "no pins":
         return errors.UVError
-    if not has_uv and (boundary == "KEEP" or initial == "CURRENT"):
+    if not has_uv and boundary == "KEEP":
         return errors.UVError
     return None
 
@@ -68,10 +69,10 @@ def test_every_combination_works_or_is_refused(initial, boundary, weights, pin, 
     error = refusal(initial, boundary, weights, pin, has_uv)
     if error:
         with pytest.raises(error) as caught:
-            unwrap(vertices, triangles, settings, uv, pinned, triangulate)
+            unwrap(vertices, triangles, settings, uv, pinned)
         assert ":" in str(caught.value)  # says what to do
         return
-    result = unwrap(vertices, triangles, settings, uv, pinned, triangulate)
+    result = unwrap(vertices, triangles, settings, uv, pinned)
     assert result.uv.shape == (len(vertices), 2) and np.isfinite(result.uv).all()
     assert 1 <= result.report.iterations <= 10 and result.report.after.symmetric_dirichlet < 3
     assert (result.report.before is not None) == has_uv
@@ -249,6 +250,21 @@ def test_smallest_surfaces():
     assert unwrap(vertices, triangles, Settings(boundary="RECTANGLE")).report.after.l2_stretch == pytest.approx(1)
 
 
+@pytest.mark.parametrize("boundary", HELD)
+def test_surfaces_with_nothing_but_an_outline(boundary):
+    vertices, triangles = shapes.grid(8, 1, width=8)
+    vertices[:, 2] = 0.3 * np.sin(vertices[:, 0])
+    result = unwrap(vertices, triangles, Settings(boundary=boundary), vertices[:, :2] * [1, 2])
+    assert np.isfinite(result.uv).all() and result.report.after.flips == 0
+
+
+def test_everything_pinned_stays():
+    vertices, triangles = shapes.bump(1)
+    uv = ellipse_uv(vertices)
+    result = unwrap(vertices, triangles, Settings(boundary="KEEP"), uv, np.ones(len(uv), bool))
+    np.testing.assert_array_equal(result.uv, uv)
+
+
 def test_refusals_name_the_cure():
     vertices, triangles = shapes.bump(1)
     for settings in (
@@ -296,9 +312,9 @@ def test_the_report_is_plain_data():
 
 def test_work_on_parts_changes_nothing(monkeypatch):
     mesh = shapes.bump(6, inner=200, outer=40)
-    whole = unwrap(*mesh, triangulate=triangulate)
+    whole = unwrap(*mesh)
     monkeypatch.setattr(arithmetic, "_AT_ONCE", 7)
-    parts = unwrap(*mesh, triangulate=triangulate)
+    parts = unwrap(*mesh)
     np.testing.assert_allclose(parts.uv, whole.uv, rtol=0, atol=1e-12)
     assert parts.report.after.to_dict() == pytest.approx(whole.report.after.to_dict(), rel=1e-9)
 
@@ -308,12 +324,12 @@ def test_large_meshes_are_sorted_and_their_results_put_back(monkeypatch):
     uv = vertices[:, :2] * [1.5, 1]
     pinned = np.zeros(len(uv), bool)
     pinned[[3, 50]] = True
-    plain = unwrap(vertices, triangles, Settings(), uv, pinned, triangulate)
+    plain = unwrap(vertices, triangles, Settings(), uv, pinned)
     monkeypatch.setattr(locality, "MANY", 100)
-    steps = unwrap_steps(vertices, triangles, Settings(), uv, pinned, triangulate)
+    steps = unwrap_steps(vertices, triangles, Settings(), uv, pinned)
     start = next(steps)
     np.testing.assert_array_equal(start.uv[pinned], uv[pinned])
-    result = unwrap(vertices, triangles, Settings(), uv, pinned, triangulate)
+    result = unwrap(vertices, triangles, Settings(), uv, pinned)
     np.testing.assert_allclose(result.uv, plain.uv, atol=1e-3)
     np.testing.assert_array_equal(result.uv[pinned], uv[pinned])
     surface = Surface(vertices, triangles)
@@ -325,7 +341,7 @@ def test_large_meshes_are_sorted_and_their_results_put_back(monkeypatch):
                 getattr(measured, name), getattr(measure(surface, of), name), rtol=1e-9, atol=1e-9
             )
     with pytest.raises(errors.DuplicateError) as raised:
-        unwrap(vertices, np.vstack([triangles, triangles[7, [1, 2, 0]]]), triangulate=triangulate)
+        unwrap(vertices, np.vstack([triangles, triangles[7, [1, 2, 0]]]))
     assert raised.value.triangles[0] in (7, len(triangles))
     with pytest.raises(errors.UVError):
-        unwrap(vertices, triangles, Settings(), uv[:-1], triangulate=triangulate)
+        unwrap(vertices, triangles, Settings(), uv[:-1])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core import Surface
-from qh_unwrap.core.validity import count_crossings, enclosed_area, is_injective, orientation, turn
+from qh_unwrap.core.certificate import count_crossings, enclosed_area, is_injective, orientation, turn
 
 from . import shapes
 
