@@ -21,7 +21,6 @@ import bpy
 import numpy as np
 import scipy
 
-from qh_unwrap.addon.delaunay import triangulate
 from qh_unwrap.core import Settings, descent, unwrap
 
 from . import assets
@@ -279,7 +278,7 @@ def converged(mesh):
     with patch.object(descent, "_NEGLIGIBLE", 1e-6):
         while True:
             initial = "AUTO" if uv is None else "CURRENT"
-            result = unwrap(*mesh, Settings(refine=200, initial=initial), uv, triangulate=triangulate)
+            result = unwrap(*mesh, Settings(refine=200, initial=initial), uv)
             before, energy, uv = energy, result.report.after.symmetric_dirichlet, result.uv
             if not before - energy > 1e-4 * before:
                 return min(before, energy)

@@ -15,11 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from qh_unwrap.core import Settings, Surface, unwrap, unwrap_together
+from qh_unwrap.core import Settings, Shape, Surface, UnwrapError, unwrap, unwrap_islands
+from qh_unwrap.core.certificate import is_injective
 from qh_unwrap.core.stepping import finished
-from qh_unwrap.core.validity import is_injective
 
-from ..core.blender import triangulate
 from ..core.overlaps import faults
 from ..core.patches import LARGEST, Patches, random_strip
 from .common import Verdicts, find_mesh, load_mesh, table
@@ -64,19 +63,21 @@ def unwrapped(patches, seed, largest=LARGEST):
     """Patch number `seed`, unwrapped."""
     kind, vertices, triangles = patches(seed, largest)
     started = time.perf_counter()
-    result = unwrap(vertices, triangles, triangulate=triangulate)
+    result = unwrap(vertices, triangles)
     seconds = time.perf_counter() - started
     report = result.report
     return Case(kind, seed, vertices, triangles, result.uv, report.injective, seconds, report.after.symmetric_dirichlet)
 
 
 def together(cases):
-    """The same patches once more, as far as they are small enough to be unwrapped together."""
-    results = finished(unwrap_together([(case.vertices, case.triangles, None) for case in cases]))
+    """The same patches once more, as the islands of one mesh."""
+    results = finished(unwrap_islands([Shape(case.vertices, case.triangles) for case in cases]))
+    for result in results:
+        if isinstance(result, UnwrapError):
+            raise result
     return [
         Case(case.kind, case.seed, case.vertices, case.triangles, result.uv, result.report.injective)
         for case, result in zip(cases, results, strict=True)
-        if result
     ]
 
 
@@ -88,15 +89,15 @@ def overlapping(patches, seed, largest=1500):
     if kind == "raw conformal":
         winding = stair(random) if random.random() < 0.7 else random_strip(random, random.integers(100, 500))
         vertices, triangles = winding
-        result = unwrap(vertices, triangles, Settings(initial="CONFORMAL", iterations=0), triangulate=triangulate)
+        result = unwrap(vertices, triangles, Settings(initial="CONFORMAL", iterations=0, refine=0))
         return Case(kind, seed, vertices, triangles, result.uv, result.report.injective)
-    uv = unwrap(vertices, triangles, Settings(iterations=3), triangulate=triangulate).uv
+    uv = unwrap(vertices, triangles, Settings(iterations=3)).uv
     surface = Surface(vertices, triangles)
     if kind == "displaced":
         uv = displaced(random, uv, surface)
         return Case(kind, seed, vertices, triangles, uv, is_injective(uv, triangles, surface.loops))
     uv, pinned = crossed(random, uv, surface)
-    result = unwrap(vertices, triangles, Settings(), uv, pinned, triangulate)
+    result = unwrap(vertices, triangles, Settings(), uv, pinned)
     assert (result.uv[pinned] == uv[pinned]).all()
     mirror = [-1 if result.report.mirrored else 1, 1]
     return Case(kind, seed, vertices, triangles, result.uv * mirror, result.report.injective)

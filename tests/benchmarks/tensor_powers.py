@@ -9,7 +9,7 @@ import numpy as np
 
 from qh_unwrap.core import Surface
 from qh_unwrap.core.distortion import measure
-from qh_unwrap.core.solver import Dirichlet
+from qh_unwrap.core.systems import Constrained
 from qh_unwrap.core.tensor import surface_tensor
 from qh_unwrap.core.weights import cotangent
 
@@ -69,10 +69,10 @@ def literal_series(surface, uv, iterations):
     """The maps (n, 2) that the literal eq. (10) makes from `uv`; its tensor, on the surface, is C^-q at q = -1."""
     held = np.zeros(len(surface.vertices), bool)
     held[surface.loops[0]] = True
-    dirichlet = Dirichlet(surface.order, surface.edges, held, uv)
+    constrained = Constrained(surface.order, surface.edges, held, uv)
     series = [uv]
     for _ in range(iterations):
-        series.append(dirichlet.solve(cotangent(surface, tensor=surface_tensor(surface, series[-1], 0.5, power=-1))))
+        series.append(constrained.solve(cotangent(surface, surface_tensor(surface, series[-1], 0.5, power=-1))))
     return series
 
 
