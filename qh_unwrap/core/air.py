@@ -127,7 +127,8 @@ def _within(points, start, end):
 
 def _outside(triangles, sides, n):
     """The triangles that lie on the right of the `sides` (s, 2); None if these do not separate them from the others."""
-    m = len(triangles)
+    m, n = len(triangles), np.int64(n)
+    triangles = triangles.astype(np.int64, copy=False)
     start, end = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
     owner = np.tile(np.arange(m), 3)
     forward, backward = sides @ [n, 1], sides @ [1, n]

@@ -39,14 +39,23 @@ class Batch:
         return np.logical_or.reduceat(self.pinned.any(axis=1), self.surface.vertex_starts)
 
     @property
+    def has_partners(self) -> np.ndarray:
+        """(p,) bool"""
+        if self.partner is None:
+            return np.zeros(self.surface.piece_count, bool)
+        apart = (self.partner != np.arange(len(self.uv))[:, None]).any(axis=1)
+        return np.logical_or.reduceat(apart, self.surface.vertex_starts)
+
+    @property
     def fixed(self) -> Fixed:
         """What pins and partners fix."""
         return Fixed(self.pinned, self.uv, self.partner)
 
     def in_frame(self, settings: Settings) -> np.ndarray:
         """(p,) bool, whether the old UVs hold the new ones."""
-        held = settings.boundary == "KEEP" or ((settings.boundary == "FREE") & self.has_pins)
-        return self.has_uv & held
+        if settings.boundary == "KEEP":
+            return self.has_uv
+        return self.has_uv & (self.has_pins | self.has_partners) & (settings.boundary == "FREE")
 
     def rows(self, pieces: np.ndarray) -> np.ndarray:
         """(n,) bool, the vertices of the chosen pieces, (p,) bool."""
@@ -110,6 +119,8 @@ class Batched:
         partner = None if shape.partner is None else np.asarray(shape.partner)
         if partner is not None and not (partner.shape == (n, 2) and ((partner >= 0) & (partner < n)).all()):
             raise ShapeError(f"partners must be vertices, in the shape ({n}, 2)")
+        if partner is not None and uv is None:
+            raise UVError("vertices that keep their distance need UVs, and there are none")
         if n <= locality.MANY:
             return Shape(vertices, triangles, uv, pinned, partner)
         mesh = self._sorted[k] = locality.Sorted(vertices, triangles)

@@ -16,7 +16,7 @@ import numpy as np
 from .air import Air, Triangulator
 from .batch import Batch
 from .boundary import held_outlines
-from .certificate import certified_pieces, wrong_pieces
+from .certificate import certified_pieces, orientation, wrong_pieces
 from .chart import Surface
 from .descent import newton_step
 from .domain import Domain, Fixed, Plane, airs_around, loose, outlined, rigid
@@ -30,6 +30,7 @@ from .weights import scheme
 _HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement
 _ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
 _NEAR = 1.2  # the energy of a start from which the refinement alone soon arrives
+_IN_AIR = 2000  # triangles of the pieces that are improved together with air around them
 _LEADS = 12  # times that pins are moved on, before their island begins anew
 _HALVINGS = 8  # of their way, each of these times
 _FEW = 0.5  # once only this part of the vertices still moves, the others take part no longer
@@ -117,6 +118,8 @@ class Course:
 
     def run(self) -> Steps:
         """Take all steps; yields after the start and after each."""
+        self.faults.clear()
+        self.warnings = [()] * self.batch.surface.piece_count
         if self.settings.boundary == "FREE":
             yield from self._free()
         else:
@@ -134,7 +137,7 @@ class Course:
         live, self._live = self._live, None
         if settings.boundary != "FREE":
             yield from self._outlined(self.best)
-        elif self.batch.has_pins.any() or self.batch.partner is not None:
+        elif (self.batch.has_pins | self.batch.has_partners).any():
             yield from self._led(live)
         elif live is not None:
             live.uv, _ = live.domain.recalled(live.uv, self.best, np.ones(len(live.pieces), bool))
@@ -207,7 +210,7 @@ class Course:
             if (value < _NEAR).any():
                 certified = certified_pieces(surface, start) if certified is None else certified
                 done = certified & (value <= _ISOMETRIC)
-                near = certified & (value < _NEAR) & ~done & ~batch.has_pins & directly & (batch.partner is None)
+                near = certified & (value < _NEAR) & ~done & ~(batch.has_pins | batch.has_partners) & directly
         self.converged |= done
         if (done | near).any():
             yield
@@ -247,13 +250,12 @@ class Course:
             still = crossed.copy()
             self._make_airs(still, start, airs)
             missing &= ~crossed | still
-        within = pieces & ~missing
-        if within.any():
-
-            def plane(surface, uv, fixed):
-                return Plane(surface, uv, fixed, [airs[k] for k in np.flatnonzero(within)], self._triangulate)
-
-            yield from self._improve(self._group(within, start, plane))
+        for within in self._portions(pieces & ~missing):
+            its = [airs[k] for k in np.flatnonzero(within)]
+            made = self._group(
+                within, start, lambda surface, uv, fixed, its=its: Plane(surface, uv, fixed, its, self._triangulate)
+            )
+            yield from self._improve(made)
         if missing.any():
             for k in np.flatnonzero(missing):
                 text = "the outline stays as it is: there is no room to free it"
@@ -261,6 +263,13 @@ class Course:
                     text = "the pins make the outline cross itself: unpin some, or move them"
                 self.warnings[k] = (text,)
             yield from self._improve(self._group(missing, start, rigid))
+
+    def _portions(self, pieces: np.ndarray) -> list[np.ndarray]:
+        """The chosen pieces (p,) bool, a few at a time: new air around one makes new equations for all of them."""
+        chosen = np.flatnonzero(pieces)
+        sizes = np.bincount(self.batch.surface.piece, minlength=len(pieces))[chosen]
+        portion = (np.cumsum(sizes) - sizes) // _IN_AIR
+        return [np.isin(np.arange(len(pieces)), chosen[portion == k]) for k in np.unique(portion)]
 
     def _make_airs(self, missing: np.ndarray, start: np.ndarray, airs: dict[int, Air]) -> None:
         """Add the air of the pieces that miss it, (p,) bool, and tick these off where it can be made."""
@@ -353,6 +362,7 @@ class Course:
         best, least, found = group.island_uv.copy(), np.full(p, np.inf), np.zeros(p, bool)
         change, held_back = np.full(p, np.inf), np.zeros(p, bool)
         going = np.ones(p, bool)
+        best_enough, stale = np.zeros(p, bool), np.zeros(p, bool)
         valid = ~wrong_pieces(group.domain.charts, group.uv)
         self._note(group, valid, iteration.repaired, None, going)
         number = 0
@@ -370,23 +380,25 @@ class Course:
             least = np.where(better, np.where(uneven, value, np.inf), least)
             found |= better
             settled = (change <= settings.tolerance) & (not self.refining)  # else the energy tells
+            best_enough |= isometric
+            stale = np.where(going, found & uneven & ~better, stale)
             done = going & (isometric | enough | settled | (number >= settings.iterations))
             self.converged[group.pieces[done]] = (isometric | (settled & ~held_back))[done]
             going &= ~done
             if not going.any() or (iteration.divisible and group.shares(going) <= _FEW):
                 ended = ~going
-                recalled = (found & uneven & ~better)[ended]
+                recalled = stale[ended]
                 yield from self._refine_best(
                     group.of(ended),
                     best[ended[island.vertex_piece]],
                     recalled,
-                    (found | valid)[ended] & ~isometric[ended],
+                    (found | valid)[ended] & ~best_enough[ended],
                 )
                 if not going.any():
                     return
                 best = best[going[island.vertex_piece]]
-                least, found, change, held_back, valid = (
-                    each[going] for each in (least, found, change, held_back, valid)
+                least, found, change, held_back, valid, best_enough, stale = (
+                    each[going] for each in (least, found, change, held_back, valid, best_enough, stale)
                 )
                 rest = _Group(group.domain, group.uv, group.pieces[going], group.rows[going[island.vertex_piece]])
                 rest.uv = iteration.of(going, group.uv)
@@ -419,6 +431,7 @@ class Course:
         settings = self.settings
         size = map_scale(group.domain.island, group.island_uv)
         going = np.ones(len(group.pieces), bool)
+        folded = _folded(group)
         for _ in range(settings.refine):
             domain = group.domain
             before, after, done = newton_step(domain, group.uv, settings.balance, size, going)
@@ -429,6 +442,7 @@ class Course:
             group.moved(after, going)
             island = domain.island
             fine = going & ~wrong_pieces([island], self.placed(group.island_uv, group.pieces, island))
+            fine &= _folded(group) <= folded
             change = _movement(island, previous, group.island_uv)
             self._note(group, fine, self.repaired[group.pieces], change, going)
             rows = fine[island.vertex_piece]
@@ -439,7 +453,8 @@ class Course:
             if not going.any():
                 return
             if group.shares(going) <= _FEW:
-                group, size, going = group.of(going), size[going], np.ones(int(going.sum()), bool)
+                group, size, folded = group.of(going), size[going], folded[going]
+                going = np.ones(len(group.pieces), bool)
 
     def _note(self, group, valid, repaired, change, going):
         """Keep what the latest step has brought, for the pieces that are `going` (p',) bool."""
@@ -450,6 +465,16 @@ class Course:
             for k, its in zip(pieces.tolist(), change[going].tolist(), strict=True):
                 self.changes[k].append(its)
         self._live = group if len(group.pieces) == len(self.changes) else None
+
+
+def _folded(group: _Group) -> np.ndarray:
+    """How many of the faces without area lie folded in every piece, (p',)."""
+    island = group.domain.island
+    flat = island.degenerate
+    if not flat.any():
+        return np.zeros(island.piece_count, int)
+    folded = orientation(group.island_uv, island.triangles[flat]) < 0
+    return np.bincount(island.piece[flat], folded, island.piece_count)
 
 
 def _movement(island: Surface, before: np.ndarray, after: np.ndarray) -> np.ndarray:

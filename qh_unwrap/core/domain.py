@@ -194,7 +194,7 @@ class Held:
             self.vertex_piece = np.concatenate([self.vertex_piece, island.hole_piece])
             fixed = fixed.followed_by(np.zeros(len(centres), bool), np.zeros((len(centres), 2)))
         self.triangles = Triangles(self.charts, len(points))
-        order = island.order if plugs is None else nested_dissection(points, self.triangles.edges)
+        order = island.order if plugs is None else nested_dissection(points, self.triangles.edges, self.vertex_piece)
         self.constrained = Constrained(order, self.triangles.edges, *fixed, group=self.vertex_piece)
 
     @property

@@ -113,7 +113,7 @@ def _turned_by_farthest(surface, uv):
     z = uv @ np.array([1, 1j])
     z = z - (np.add.reduceat(z, starts) / count)[piece]
     distance = np.abs(z)
-    is_farthest = distance == np.maximum.reduceat(distance, starts)[piece]
+    is_farthest = distance >= (1 - 1e-6) * np.maximum.reduceat(distance, starts)[piece]  # of equal ones the first
     farthest = np.flatnonzero(is_farthest)
     farthest = farthest[np.diff(piece[farthest], prepend=-1) > 0]
     way = np.conj(z[farthest]) / np.maximum(distance[farthest], np.finfo(float).tiny)

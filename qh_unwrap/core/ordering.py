@@ -57,7 +57,7 @@ class Dissection:
         smallest set of vertices that meets every cut edge (Koenig's theorem) separates the halves.
         """
         n, axes = points.shape
-        several = group is not None and len(group) > 0 and group[0] != group[-1]
+        several = group is not None and len(group) > 0 and (group != group[0]).any()
         levels = max(0, int(np.ceil(np.log2(max(_largest(n, group), 1) / _LEAF))))
         key = np.zeros(n, dtype=np.int64)
         part = np.zeros(n, np.int16)  # -1 once in a separator; short numbers are sorted faster

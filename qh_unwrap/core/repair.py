@@ -42,6 +42,8 @@ class Repair:
         marked[: len(kept)] = kept
         uv = domain.constrained.solve(_raised(domain, weights, marked))
         wrong = wrong_pieces(domain.charts, uv)
+        if wrong.any() and not wrong.all():
+            return self._solve_some(domain, weights, previous, uv, wrong)
         for _ in range(_ROUNDS):
             in_island = np.zeros(len(wrong), bool)
             in_island[island.piece[wrong_triangles(island, uv)]] = True
@@ -64,6 +66,28 @@ class Repair:
             uv = _shortened(domain, previous, uv, self.shortened)
             wrong = wrong & ~self.shortened
         return uv, ~wrong
+
+    def _solve_some(self, domain, weights, previous, uv, pieces):
+        """The same for the chosen `pieces` (p,) bool alone; the others have their map `uv` already."""
+        rows, at_edges = pieces[domain.vertex_piece], pieces[domain.vertex_piece[domain.triangles.edges[:, 0]]]
+        in_island = rows[: len(domain.island.vertices)]
+        some = Repair(self.remember, int(pieces.sum()))
+        if len(self._marked):
+            some._marked = self._marked[in_island]
+        part, its_previous = domain.of(pieces, previous)
+        uv = uv.copy()
+        uv[rows], valid = some.solve(part, weights[:, at_edges], its_previous)
+        self.active[pieces] |= some.active
+        self.shortened = np.zeros(len(pieces), bool)
+        self.shortened[pieces] = some.shortened
+        if self.remember:
+            marked = np.zeros(len(in_island), bool)
+            marked[: len(self._marked)] = self._marked
+            marked[in_island] = some._marked
+            self._marked = marked
+        everything = ~pieces
+        everything[pieces] = valid
+        return uv, everything
 
 
 def _shortened(domain, previous, uv, pieces):

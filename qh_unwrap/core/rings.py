@@ -2,9 +2,10 @@
 """A start for what is deep: tubes, horns, towers and trees, whose other maps shrink towards the tips.
 
 Along a tube with one opening a harmonic map shrinks like exp(-length / radius), more than single precision can hold
-beyond some forty radii.  Laid out in rings around the tip, each as far outside the one before as it lies along the tube,
-the same tube shrinks only like radius / length.  With more conductivity along the tube than around it that layout is
-itself harmonic; and with positive weights on a convex outline nothing flips (Tutte 1963), however the surface branches.
+beyond some forty radii.  Laid out in rings around the tip, each as far outside the one before as it lies along the
+tube, the same tube shrinks only like radius / length.  With more conductivity along the tube than around it that
+layout is itself harmonic; and with positive weights on a convex outline nothing flips (Tutte 1963), however the
+surface branches.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ def ring_map(domain: Held) -> np.ndarray:
     depth = _depths(domain, length, distance)
     weights = []
     for chart in domain.charts:
-        # A ring of radius r that goes on for the depth d is to lie d around its tip, d / r times as wide as it is.  Then
-        # what flows along the tube balances what flows around it if the conductivity along is ((d / r)^2 + 1) / 2.
+        # A ring of radius r that goes on for the depth d is to lie d around its tip, d / r times as wide as it is.
+        # Then what flows along the tube balances what flows around it, if the conductivity along is this:
         conductivity = 0.5 + 0.5 * np.maximum(depth[chart.triangles].mean(axis=1) + 0.5, 1) ** 2
         away = _gradients(chart, distance)
         x, y = away / np.maximum(np.linalg.norm(away, axis=0), np.finfo(float).tiny)

@@ -45,7 +45,7 @@ def _weighted_or_ring_map(domain, initial):
 
 
 def best_start(surface: Surface, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
-    """Of the certified natural maps of every piece a good one, or that of least energy; where none is certified, of all.
+    """Of the certified natural maps of every piece a good one, or that of least energy; of all, if none is certified.
 
     Returns the map (n, 2), and for which pieces (p,) it is certified.
     """

@@ -15,9 +15,8 @@ from .factors import Factorizer, Factors, superlu
 from .triangles import parts
 
 _STEPS = 100  # of conjugate gradients, at most
-_LARGE = (
-    1000  # unknowns, from which on an old factorization is tried first, and preconditioners are in single precision
-)
+# Of one piece; islands that go together with others have fewer unknowns.
+_LARGE = 4000  # unknowns, from which on old factors are tried first, and preconditioners are in single precision
 _PATIENCE = 7  # steps of conjugate gradients that an old factorization may take
 _HUGE = 30_000  # unknowns, from which on it pays to solve in single precision and to correct the solutions
 
@@ -75,6 +74,7 @@ def _leaders(partner):
     while True:
         smaller = leader.copy()
         np.minimum.at(smaller, partner, leader)
+        smaller = np.minimum(smaller, smaller[partner])
         smaller = smaller[smaller]
         if (smaller == leader).all():
             return leader
@@ -172,7 +172,7 @@ class Constrained:
         self.held = np.column_stack([self.unknowns[0].held, self.unknowns[-1].held])
         self.values = values
         self._order, self._factorizer = order, factorizer
-        self._group = None if group is None or not len(group) or group[0] == group[-1] else group
+        self._group = None if group is None or not len(group) or (group == group[0]).all() else group
         self._mean: list[Factors] | None = None
         self._blocks: np.ndarray | None = None
         self._all: Pattern | None = None
@@ -183,6 +183,10 @@ class Constrained:
             self.values = values
             return self
         return Constrained(self._order, self.edges, held, values, partner, self._group, self._factorizer)
+
+    def _is_alone(self, size):
+        """Whether there is one piece only, of that many unknowns: what suits large ones must not depend on company."""
+        return self._group is None and self.patterns[0].size >= size
 
     @property
     def fixed(self) -> np.ndarray:
@@ -212,7 +216,7 @@ class Constrained:
         n = len(self._order)
         diagonal = self.diagonal(weights)
         solvers = [
-            self._factorizer(pattern.matrix(-weights[0], -weights[1], diagonal), pattern.size >= _HUGE)
+            self._factorizer(pattern.matrix(-weights[0], -weights[1], diagonal), self._is_alone(_HUGE))
             if pattern.size
             else None
             for pattern in self.patterns
@@ -263,8 +267,7 @@ class Constrained:
             sharper = [factors.sharpened() for factors in self._mean] if missed else []
             if any(sharper):
                 solution, _ = self._conjugate_gradients(hessian, rhs, np.zeros_like(rhs), residual, _STEPS)
-            # Only one large piece profits from old factors, and whether it does must not depend on company.
-            if tried or self._group is not None or len(rhs) < _LARGE:
+            if tried or not self._is_alone(_LARGE):
                 self._mean = None
         self._scattered(solution, direction)
         return direction
@@ -283,7 +286,7 @@ class Constrained:
             sign = 1 - 2 * c
             m = m[0] + sign * d[0], m[1] + sign * d[1]
         pattern = self.patterns[c]
-        return self._factorizer(pattern.matrix(m[0], m[0], m[1]), pattern.size >= _LARGE)
+        return self._factorizer(pattern.matrix(m[0], m[0], m[1]), self._is_alone(_LARGE))
 
     def _hessian(self, beside: Sequence[np.ndarray], own: Sequence[np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
         """The product of the Hessian with values of the unknowns, shaped as these."""

@@ -15,7 +15,7 @@ from .report import Result, Shape, State
 from .session import Unwrapper
 from .settings import Settings
 
-_TOGETHER = 5000  # triangles of the largest island that goes together with others
+_TOGETHER = 2000  # triangles of the largest island that goes together with others
 _AT_ONCE = 60_000  # triangles of islands that go together
 _FIXED = 300  # triangles that take as long as what an island takes whatever its size
 _LEFT = 0.85  # of an island after each step, by and large
@@ -125,7 +125,7 @@ def _portions(shapes):
 
 
 def _size(shape):
-    return int(np.shape(shape.triangles)[0]) if np.ndim(shape.triangles) else 0
+    return len(shape.triangles) if hasattr(shape.triangles, "__len__") else 0
 
 
 def _reported(error):

@@ -119,12 +119,12 @@ class Stretch:
     def __init__(self) -> None:
         self._weights: dict[Chart, np.ndarray] = {}
 
-    def __call__(self, chart: Chart, uv: np.ndarray) -> np.ndarray:
-        """The next weights (2, k) after the chart's map `uv` (n, 2)."""
+    def __call__(self, chart: Chart, uv: np.ndarray, scale: np.ndarray | None = None) -> np.ndarray:
+        """The next weights (2, k) after the chart's map `uv` (n, 2), of which the pieces have the `scale` (p,)."""
         weights = self._weights.get(chart)
         if weights is None:
             weights = mean_value(chart)
-        larger, smaller, *_ = squared_stretches(chart, uv)
+        larger, smaller, *_ = squared_stretches(chart, uv, scale=scale)
         area = np.repeat(chart.area, 3)
         corner = chart.triangles.ravel()
         squared = np.repeat((1 / larger + 1 / smaller) / 2, 3)
@@ -150,7 +150,7 @@ def scheme(settings: Settings) -> Callable[[Sequence[Chart], np.ndarray], list[n
         if chart.is_air:
             return mean_value(chart, None, chart.shapes(uv))
         if settings.weights == "STRETCH":
-            return stretch(chart, uv)
+            return stretch(chart, uv, scale)
         make_tensor = plane_tensor if settings.weights == "MEAN_VALUE" else scalar_tensor
         return mean_value(chart, make_tensor(chart, uv, t, q, scale), corners_of(uv, chart.triangles))
 

@@ -53,7 +53,7 @@ def test_vertices_in_one_place(settings, name, seed, share):
     "settings",
     [
         # The refinement turns over faces without area that were not turned over before.
-        pytest.param(its, id=name, marks=[pytest.mark.xfail(strict=True)] if name == "hull of a projection" else [])
+        pytest.param(its, id=name)
         for name, its in _SETTINGS.items()
     ],
 )

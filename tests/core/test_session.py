@@ -5,7 +5,7 @@ import weakref
 import numpy as np
 import pytest
 
-from qh_unwrap.core import Settings, Shape, Surface, Unwrapper, UnwrapError, errors, locality, unwrap, unwrap_islands
+from qh_unwrap.core import Settings, Shape, Surface, UnwrapError, Unwrapper, errors, locality, unwrap, unwrap_islands
 from qh_unwrap.core.energy import energies
 
 from . import shapes

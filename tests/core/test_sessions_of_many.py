@@ -29,7 +29,6 @@ def test_only_shapes_with_errors_have_no_state(bump):
     assert [session.state(k) is not None for k in range(4)] == [False, True, False, True]
 
 
-@pytest.mark.xfail(strict=True)  # the error outlives its cause
 def test_an_outline_that_could_not_be_held_can_be_set_free(bump):
     session = finished(Unwrapper([Shape(*bump[:2])], Settings(boundary="KEEP")))
     assert type(session.results()[0]) is errors.UVError

@@ -63,10 +63,10 @@ def skewed(vertices, triangles):
         {},
         {"refine": 0},
         # How exactly an island is solved still depends on company.
-        pytest.param({"initial": "MEAN_VALUE"}, marks=pytest.mark.xfail(strict=True)),
+        {"initial": "MEAN_VALUE"},
         # A flat island is refined that needs nothing, if others do.
-        pytest.param({"boundary": "CIRCLE"}, marks=pytest.mark.xfail(strict=True)),
-        pytest.param({"boundary": "CIRCLE", "fill_holes": False, "balance": 0.5}, marks=pytest.mark.xfail(strict=True)),
+        {"boundary": "CIRCLE"},
+        {"boundary": "CIRCLE", "fill_holes": False, "balance": 0.5},
         {"boundary": "OUTLINE", "weights": "MEAN_VALUE"},
         {"boundary": "CIRCLE", "weights": "STRETCH", "iterations": 3},
     ],
@@ -96,7 +96,6 @@ def test_pins_and_kept_outlines_are_those_of_each_island(curved):
             assert np.abs(result.uv - alone.uv).max() < SAME * np.ptp(alone.uv, axis=0).max()
 
 
-@pytest.mark.xfail(strict=True)  # how exactly an island is solved still depends on company
 def test_small_islands_are_certified_and_as_they_are_alone(small):
     results = together(small)
     assert sum(result.report.converged for result in results) > 0.9 * len(small)
@@ -129,7 +128,6 @@ def test_only_what_cannot_be_unwrapped_has_errors(monkeypatch):
     assert together([]) == []
 
 
-@pytest.mark.xfail(strict=True)  # shapes are measured before they are looked at
 def test_triangles_of_uneven_length_are_the_fault_of_one_island():
     good = shapes.bump(1)
     results = together([good, (good[0], [[0, 1, 2], [0, 1]])])
