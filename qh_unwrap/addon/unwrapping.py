@@ -117,10 +117,19 @@ def _keep(work, result):
     work.uv, work.loops, work.mirrored = result.uv, result.loops, report.mirrored
     outcome.before, outcome.after = report.before, report.after
     outcome.iterations, outcome.converged = report.iterations, report.converged
-    outcome.warnings += report.warnings
-    if work.island.crowded_edges:
-        edges = count(work.island.crowded_edges, "edge")
-        outcome.warnings += (f"it ends at {edges} where more than two faces meet",)
+    outcome.warnings += (*report.warnings, *_remarks(work.island))
+
+
+def _remarks(island):
+    """What there is to say of how an island was made of its faces."""
+    if island.turned_faces and not island.one_sided_edges:  # what is one-sided has no outside
+        faces = count(island.turned_faces, "face")
+        yield f"{faces} {'is' if island.turned_faces == 1 else 'are'} inside out: turned for the unwrap"
+    if island.one_sided_edges:
+        edges = count(island.one_sided_edges, "edge")
+        yield f"it is one-sided, like a Möbius band: cut at {edges}; mark a seam across it to choose where"
+    if island.crowded_edges:
+        yield f"it ends at {count(island.crowded_edges, 'edge')} where more than two faces meet"
 
 
 def _write(obj, works):

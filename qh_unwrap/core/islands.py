@@ -4,13 +4,17 @@
 A *corner* is one vertex of one face; the corners of a face follow each other, and corner `c` starts the face's edge
 `corner_edge[c]`.  Corners become one UV vertex where faces hang together across an edge, and only there: so a seam
 inside an island opens it, and a vertex where two fans of faces merely touch is split.
+
+Faces that are inside out are turned for the unwrap, and what is one-sided is cut; the mesh stays as it is.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from itertools import pairwise
 
 import numpy as np
 
 from .pieces import components, first_and_last
+from .winding import agreed
 
 
 @dataclass(frozen=True)
@@ -21,10 +25,12 @@ class Island:
     corners: np.ndarray  # (c,) mesh corners
     corner_vertex: np.ndarray  # (c,) island vertex of each of these corners
     vertices: np.ndarray  # (n,) mesh vertex of each island vertex
-    triangles: np.ndarray  # (t, 3) island vertices
+    triangles: np.ndarray  # (t, 3) island vertices, all wound alike
     triangle_corners: np.ndarray  # (t, 3) the same as mesh corners
-    drawn_corners: np.ndarray  # (t, 3) the mesh's own triangles of the faces, as mesh corners
-    crowded_edges: int = 0  # edges of its outline where more than two faces meet
+    drawn_corners: np.ndarray  # (t, 3) the mesh's own triangles of the same faces, as mesh corners, wound like these
+    turned_faces: int  # faces that are inside out
+    one_sided_edges: int  # edges where it is cut since it is one-sided
+    crowded_edges: int  # edges of its outline where more than two faces meet
 
 
 def find_islands(
@@ -45,56 +51,83 @@ def find_islands(
 
     Faces are neighbours across an edge that is no seam and that exactly two selected faces use.
     """
-    corner_count, face_count = len(corner_vertex), len(face_start)
-    corner_face, following = _around_faces(face_start, corner_count)
+    corner_face, following = _around_faces(face_start, len(corner_vertex))
     chosen_corners = np.flatnonzero(selected[corner_face])
-    one, start, end = _across_edges(corner_vertex, corner_edge, following, seam, chosen_corners)
+    one, start, end, opposed = _across_edges(corner_vertex, corner_edge, following, seam, chosen_corners)
+    here, there = corner_face[one], corner_face[start]
+    face_island = components(len(face_start), here, there)[1]
+    turned, cut = agreed(here, there, opposed, face_island)
+    if cut.any():
+        one, start, end = (each[~cut] for each in (one, start, end))
     uv_vertex = _uv_vertices(one, start, end, following)
-    face_island = components(face_count, corner_face[one], corner_face[start])[1]
-
-    drawn = corner_triangles
-    corner_triangles = _without_doubled_diagonals(drawn, following, uv_vertex)
-    chosen = np.flatnonzero(selected)
-    _, first, rank = np.unique(face_island[chosen], return_index=True, return_inverse=True)
-    island_order = np.argsort(np.argsort(first))  # by the first face
-    face_rank = np.zeros(face_count, dtype=np.intp)
-    face_rank[chosen] = island_order[rank]
-    corner_rank = face_rank[corner_face]
+    triangles = _without_doubled_diagonals(corner_triangles, following, uv_vertex)
     triangle_face = corner_face[corner_triangles[:, 0]]
-    chosen_triangles = np.flatnonzero(selected[triangle_face])
+    drawn = corner_triangles
+    if turned.any():
+        triangles, drawn = (_turned(each, turned[triangle_face]) for each in (triangles, drawn))
 
-    # UV vertices, those of one island after another
-    rank_of = np.full(uv_vertex.max(initial=-1) + 1, -1)
-    rank_of[uv_vertex[chosen_corners]] = corner_rank[chosen_corners]
-    used, first_vertex = _grouped(np.flatnonzero(rank_of >= 0), rank_of)
-    number = np.zeros(len(rank_of), dtype=np.intp)
-    number[used] = np.arange(len(used)) - first_vertex[rank_of[used]]
-    island_vertex = number[uv_vertex]
-    mesh_vertex = np.zeros(len(rank_of), dtype=np.intp)
-    mesh_vertex[uv_vertex[chosen_corners]] = corner_vertex[chosen_corners]
+    rank, count = _ranks(face_island, selected)
+    corner_rank, triangle_rank = rank[corner_face], rank[triangle_face]
+    faces, face_starts = _grouped(np.flatnonzero(selected), rank, count)
+    corners, corner_starts = _grouped(chosen_corners, corner_rank, count)
+    its, triangle_starts = _grouped(np.flatnonzero(selected[triangle_face]), triangle_rank, count)
+    first_corner, vertex_starts, island_vertex = _vertices(uv_vertex, corners, corner_rank, count)
 
-    crowded = (np.bincount(corner_edge[chosen_corners], minlength=len(seam)) > 2) & ~seam
-    crowded_corners = chosen_corners[crowded[corner_edge[chosen_corners]]]
-    pairs = np.unique(corner_rank[crowded_corners] * np.int64(len(seam)) + corner_edge[crowded_corners])
-    crowded_edges = np.bincount(pairs // max(len(seam), 1), minlength=len(first)).tolist()
+    def counted(faces):
+        return np.bincount(rank[faces], minlength=count).tolist()
 
-    def split(values, starts):
-        return np.split(values, starts[1:]) if len(first) else []
-
-    faces, face_starts = _grouped(chosen, face_rank)
-    corners, corner_starts = _grouped(chosen_corners, corner_rank)
-    triangles, triangle_starts = _grouped(chosen_triangles, face_rank[triangle_face])
     columns = {
-        "faces": split(faces, face_starts),
-        "corners": split(corners, corner_starts),
-        "corner_vertex": split(island_vertex[corners], corner_starts),
-        "vertices": split(mesh_vertex[used], first_vertex),
-        "triangles": split(island_vertex[corner_triangles[triangles]], triangle_starts),
-        "triangle_corners": split(corner_triangles[triangles], triangle_starts),
-        "drawn_corners": split(drawn[triangles], triangle_starts),
-        "crowded_edges": crowded_edges,
+        "faces": _split(faces, face_starts),
+        "corners": _split(corners, corner_starts),
+        "corner_vertex": _split(island_vertex[corners], corner_starts),
+        "vertices": _split(corner_vertex[first_corner], vertex_starts),
+        "triangles": _split(island_vertex[triangles[its]], triangle_starts),
+        "triangle_corners": _split(triangles[its], triangle_starts),
+        "drawn_corners": _split(drawn[its], triangle_starts),
+        "turned_faces": counted(turned),
+        "one_sided_edges": counted(here[cut]),
+        "crowded_edges": _crowded_edges(corner_edge[chosen_corners], corner_rank[chosen_corners], seam, count),
     }
-    return [Island(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+    in_order = (columns[field.name] for field in fields(Island))
+    return [Island(*row) for row in zip(*in_order, strict=True)]
+
+
+def _ranks(face_island, selected):
+    """The number of each face's island, (f,), counting those of selected faces by their first faces, and how many these
+    are."""
+    chosen = np.flatnonzero(selected)
+    _, first, number = np.unique(face_island[chosen], return_index=True, return_inverse=True)
+    rank = np.zeros(len(face_island), dtype=np.intp)
+    rank[chosen] = np.argsort(np.argsort(first))[number]
+    return rank, len(first)
+
+
+def _vertices(uv_vertex, corners, corner_rank, count):
+    """A corner of every UV vertex that the corners have, one island after another, where each island begins among
+    these, and the number of each corner's UV vertex within its island, (c,)."""
+    some_corner = np.full(uv_vertex.max(initial=-1) + 1, -1)
+    some_corner[uv_vertex[corners]] = corners
+    used = np.flatnonzero(some_corner >= 0)
+    ordered, starts = _grouped(some_corner[used], corner_rank, count)
+    number = np.zeros(len(some_corner), dtype=np.intp)
+    number[uv_vertex[ordered]] = np.arange(len(ordered)) - starts[corner_rank[ordered]]
+    return ordered, starts, number[uv_vertex]
+
+
+def _crowded_edges(edges, ranks, seam, count):
+    """How many edges each of `count` islands has where more than two faces meet, of the edges and the islands' ranks of
+    corners, (k,) each."""
+    crowded = (np.bincount(edges, minlength=len(seam)) > 2) & ~seam
+    if not crowded.any():
+        return [0] * count
+    crowded = crowded[edges]
+    pairs = np.unique(ranks[crowded] * np.int64(len(seam)) + edges[crowded])
+    return np.bincount(pairs // len(seam), minlength=count).tolist()
+
+
+def _turned(triangles, backward):
+    """The triangles (t, 3), those that are `backward`, (t,) bool, run the other way round."""
+    return np.where(backward[:, None], triangles[:, [0, 2, 1]], triangles)
 
 
 def cuts(
@@ -109,7 +142,7 @@ def cuts(
     corners = np.arange(len(corner_vertex))
     _, following = _around_faces(face_start, len(corners))
     seam = np.zeros(edge_count, dtype=bool)
-    one, start, end = _across_edges(corner_vertex, corner_edge, following, seam, corners)
+    one, start, end, _ = _across_edges(corner_vertex, corner_edge, following, seam, corners)
     cut = np.zeros(edge_count, dtype=bool)
     cut[corner_edge[one[_gaps(uv, one, start, end, following) > tolerance]]] = True
     return cut
@@ -127,7 +160,7 @@ def attached(
     """The corners, (c,) bool, of selected faces that hang on unselected ones: no seam parts them, nor do the UVs."""
     corners = np.arange(len(corner_vertex))
     corner_face, following = _around_faces(face_start, len(corners))
-    one, start, end = _across_edges(corner_vertex, corner_edge, following, seam, corners)
+    one, start, end, _ = _across_edges(corner_vertex, corner_edge, following, seam, corners)
     joined = _gaps(uv, one, start, end, following) <= tolerance
     uv_vertex = _uv_vertices(one[joined], start[joined], end[joined], following)
     is_selected = selected[corner_face]
@@ -151,12 +184,13 @@ def _around_faces(face_start, corner_count):
 
 def _across_edges(corner_vertex, corner_edge, following, seam, corners):
     """Three corners for every edge that joins two faces, (k,) each: that of one face that starts the edge, and those of
-    the other face at the edge's start and end."""
+    the other face at the edge's start and end; and whether both run along it the same way, so that one of the faces is
+    inside out, (k,) bool."""
     uses = np.bincount(corner_edge[corners], minlength=len(seam))
     inner = (uses == 2) & ~seam
     one, other = (each[inner] for each in first_and_last(corners, corner_edge[corners], len(seam)))
-    alike = corner_vertex[one] == corner_vertex[other]  # both run the same way: one of the faces is inside out
-    return one, np.where(alike, other, following[other]), np.where(alike, following[other], other)
+    opposed = corner_vertex[one] == corner_vertex[other]
+    return one, np.where(opposed, other, following[other]), np.where(opposed, following[other], other), opposed
 
 
 def _uv_vertices(one, start, end, following):
@@ -170,12 +204,16 @@ def _without_doubled_diagonals(triangles, following, uv_vertex):
     Faces are triangulated one by one, so where two of them share several edges in a row, both may be cut along the
     same diagonal, and the triangles beside it would lie on top of each other.  Such diagonals are flipped.
     """
-    if (np.roll(triangles, -1, axis=1) == following[triangles]).all():
-        return triangles  # there are no diagonals
+    if 3 * len(triangles) == len(following):
+        return triangles  # all faces are triangles: there are no diagonals
     for _ in range(8):
         halves = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-        low, high = np.sort(uv_vertex[halves], axis=1).T
-        _, edge, uses = np.unique(low * np.int64(uv_vertex.max() + 1) + high, return_inverse=True, return_counts=True)
+        start, end = uv_vertex[halves].T
+        key = np.minimum(start, end) * np.int64(uv_vertex.max() + 1) + np.maximum(start, end)
+        ordered = np.sort(key)
+        if (ordered[2:] != ordered[:-2]).all():
+            break
+        _, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
         is_diagonal = halves[:, 1] != following[halves[:, 0]]
         doubled = np.flatnonzero(is_diagonal & (uses[edge] > 2))
         if not len(doubled):
@@ -196,8 +234,16 @@ def _flipped(triangles, rows):
     return triangles
 
 
-def _grouped(items, rank):
-    """The items sorted by their rank, and where each rank begins; equal ones stay in order."""
+def _grouped(items, rank, count):
+    """The items sorted by their rank, and where each of `count` ranks begins; equal ones stay in order."""
+    if count == 1:
+        return items, np.zeros(1, dtype=np.intp)
     own = rank[items]
     order = np.argsort(own, kind="stable")
-    return items[order], np.searchsorted(own[order], np.arange(own.max(initial=-1) + 1))
+    return items[order], np.searchsorted(own[order], np.arange(count))
+
+
+def _split(values, starts):
+    """The values of each island, where they begin at `starts`."""
+    edges = [*starts.tolist(), len(values)]
+    return [values[start:end] for start, end in pairwise(edges)]

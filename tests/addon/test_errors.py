@@ -51,12 +51,6 @@ def scaled_to_nothing():
     return obj
 
 
-def inside_out():
-    obj = add_grid(3)
-    obj.data.polygons[4].flip()
-    return obj
-
-
 def doubled():
     return mesh_object("Doubled", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2], [0, 1, 2]])
 
@@ -97,7 +91,6 @@ def pinned():
         (not_a_number, {}, "1 vertex has coordinates that are no numbers"),
         (flat_to_a_line, {}, "all its faces have zero area"),
         (scaled_to_nothing, {}, "all its faces have zero area"),
-        (inside_out, {}, "face opposite ways: recalculate the normals"),
         (doubled, {}, "on top of another with the same corners: delete the duplicates"),
         (without_uvs, {"boundary": 'KEEP'}, "a kept boundary needs UVs, and there are none"),
         (without_uvs, {"initial": 'CURRENT', "boundary": 'CIRCLE'}, "to start from the current UVs there must be some"),
@@ -198,7 +191,6 @@ def broken():
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("bad_inverted_triangles", "face opposite ways: recalculate the normals"),
         ("punctured_torus_g1", "like a torus: mark seams"),
         ("cat_closed_slivers", "is closed: mark a seam"),
     ],
@@ -239,14 +231,20 @@ def test_toy_is_unwrapped_with_a_warning_once_it_has_a_seam(broken):
     assert not large.error and "it ends at 1 edge where more than two faces meet" in large.warnings
 
 
-def test_vierbein_is_unwrapped_where_it_is_wound_alike(broken):
+def test_inverted_triangles_are_turned(broken):
+    broken("bad_inverted_triangles")
+    assert bpy.ops.uv.qh_unwrap(iterations=1) == {'FINISHED'}
+    (outcome,) = operators.last_outcomes
+    assert "10408 faces are inside out: turned for the unwrap" in outcome.warnings and outcome.is_clean
+
+
+def test_vierbein_is_unwrapped_though_it_is_not_wound_alike(broken):
     broken("bad_nonmanifold_vierbein")
     assert bpy.ops.uv.qh_unwrap() == {'FINISHED'}
-    done = [outcome for outcome in operators.last_outcomes if not outcome.error]
-    failed = [outcome for outcome in operators.last_outcomes if outcome.error]
-    assert len(done) == 4 and len(failed) == 2
-    assert all("more than two faces meet" in outcome.warnings[0] for outcome in done)
-    assert all("recalculate the normals" in outcome.error for outcome in failed)
+    assert len(operators.last_outcomes) == 6 and all(outcome.is_clean for outcome in operators.last_outcomes)
+    assert all("more than two faces meet" in outcome.warnings[-1] for outcome in operators.last_outcomes)
+    turned = [outcome.warnings[0] for outcome in operators.last_outcomes if "inside out" in outcome.warnings[0]]
+    assert turned == [f"{number} faces are inside out: turned for the unwrap" for number in (2, 8)]
 
 
 def test_nothing_is_selected():

@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core.chart import Surface
-from qh_unwrap.core.errors import DuplicateError, WindingError
+from qh_unwrap.core.errors import DuplicateError
 from qh_unwrap.core.islands import attached, cuts, find_islands
+from qh_unwrap.core.topology import Topology
 
 
 def mesh(faces, seams=()):
@@ -94,12 +95,102 @@ def test_third_face_not_selected_does_not_matter():
     assert list(island.faces) == [0, 1]
 
 
-def test_opposite_winding_stays_together():
-    """So that it is seen, and not taken for a seam."""
-    (island,) = split([[0, 1, 2], [0, 1, 3]])
-    assert len(island.vertices) == 4
-    with pytest.raises(WindingError):
-        Surface(np.random.default_rng(0).random((4, 3)), island.triangles)
+def run_against_each_other(triangles):
+    """How many edges have two triangles that run along them the same way."""
+    halves = np.vstack([triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    return len(halves) - len(np.unique(halves, axis=0))
+
+
+@pytest.mark.parametrize("flipped", [[4], [0], [0, 1, 2, 5], range(0, 25, 2), range(5, 25)])
+def test_the_fewer_faces_are_turned(flipped):
+    faces = grid(5)
+    turned = [face[::-1] if k in flipped else face for k, face in enumerate(faces)]
+    (island,) = split(turned)
+    assert sorted(island.vertices) == list(range(36))
+    assert run_against_each_other(island.triangles) == 0
+    assert island.turned_faces == min(len(flipped), 25 - len(flipped)) and not island.one_sided_edges
+    corner_vertex, *_, given = mesh(turned)
+    assert np.array_equal(island.vertices[island.triangles], corner_vertex[island.triangle_corners])
+    as_given = (island.triangle_corners == given).all(axis=1)
+    other_way = (island.triangle_corners == given[:, [0, 2, 1]]).all(axis=1)
+    assert (as_given ^ other_way).all() and other_way.sum() == 2 * island.turned_faces
+
+
+def test_of_as_many_faces_those_unlike_the_first_are_turned():
+    (island,) = split([[1, 0, 2], [1, 0, 3]])
+    assert island.turned_faces == 1
+    assert np.array_equal(island.vertices[island.triangles], [(1, 0, 2), (1, 3, 0)])
+
+
+def test_islands_are_turned_each_for_itself():
+    turned = [[0, 1, 2], [0, 3, 1], [10, 11, 12], [10, 11, 13], [11, 14, 12]]
+    one, other = split(turned)
+    assert (one.turned_faces, other.turned_faces) == (0, 1)
+    assert run_against_each_other(other.triangles) == 0
+
+
+def moebius(around, across):
+    """Quads of a band that is joined to itself turned over."""
+    row = across + 1
+
+    def vertex(i, j):
+        return i * row + j if i < around else across - j
+
+    return [
+        [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)]
+        for i in range(around)
+        for j in range(across)
+    ]
+
+
+def klein(around, across):
+    """Quads of a tube that is joined to itself turned over."""
+
+    def vertex(i, j):
+        return i * across + j % across if i < around else -j % across
+
+    return [
+        [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)]
+        for i in range(around)
+        for j in range(across)
+    ]
+
+
+def projective():
+    """Ten triangles that make a projective plane."""
+    near = [[0, 1, 4], [0, 1, 5], [0, 2, 3], [0, 2, 5], [0, 3, 4]]
+    return near + [[1, 2, 3], [1, 2, 4], [1, 3, 5], [2, 4, 5], [3, 4, 5]]
+
+
+@pytest.mark.parametrize("faces", [moebius(12, 3), moebius(40, 3), moebius(5, 1), klein(12, 8), projective()])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_one_sided_is_cut(faces, seed):
+    random = np.random.default_rng(seed)
+    if seed:
+        faces = [faces[k] for k in random.permutation(len(faces))]
+        faces = [face[::-1] if random.random() < 0.5 else face for face in faces]
+    (island,) = split(faces)
+    topology = Topology(island.triangles, len(island.vertices))
+    assert run_against_each_other(island.triangles) == 0
+    assert topology.component_counts == 1 and not topology.pinched.any() and topology.loop_counts > 0
+    uses = np.bincount(mesh(faces)[1])
+    assert 0 < island.one_sided_edges <= 0.2 * len(uses) + 3
+    assert (topology.edge_uses == 1).sum() == (uses == 1).sum() + 2 * island.one_sided_edges, "only cuts open it"
+
+
+def test_a_seam_across_a_moebius_band_needs_no_cut():
+    (island,) = split(moebius(12, 3), [(0, 1), (1, 2), (2, 3)])
+    assert island.one_sided_edges == 0 and island.turned_faces == 0
+    assert Topology(island.triangles, len(island.vertices)).faults() == {}
+
+
+def test_one_sided_and_two_sided_islands_side_by_side():
+    band = [[vertex + 100 for vertex in face] for face in moebius(12, 3)]
+    sheet = grid(4)
+    sheet[7] = sheet[7][::-1]
+    one, other, third = split([[300, 301, 302], *sheet, *band])
+    assert (one.turned_faces, other.turned_faces) == (0, 1)
+    assert (one.one_sided_edges, other.one_sided_edges) == (0, 0) and third.one_sided_edges > 0
 
 
 def test_duplicate_faces_stay_together():

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes as they come: faces inside out, one-sided bands."""
+
+import bpy  # isort: skip
+import numpy as np
+import pytest
+from scenes import changes, mesh_object, snapshot, uvs
+
+from qh_unwrap import last_report
+
+
+def sheet(size=6):
+    """Points and quads of a bumpy square."""
+    x, y = np.meshgrid(np.linspace(0, 1, size + 1), np.linspace(0, 1, size + 1), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), (0.3 * np.sin(3 * x) * np.cos(2 * y + 0.4)).ravel()])
+    corner = (np.arange(size)[:, None] * (size + 1) + np.arange(size)).ravel()
+    return points, np.column_stack([corner, corner + size + 1, corner + size + 2, corner + 1]).tolist()
+
+
+def unwrapped(points, faces, uv=None, seams=(), pins=(), **options):
+    """The object, after its unwrap, and the report on its islands; `pins` are corners."""
+    obj = mesh_object("Mesh", points, faces)
+    if uv is not None:
+        layer = obj.data.uv_layers.new(name="UVMap")
+        layer.uv.foreach_set("vector", np.asarray(uv, dtype=np.float32).ravel())
+    for edge in obj.data.edges:
+        edge.use_seam = tuple(sorted(edge.vertices)) in seams
+    if len(pins):
+        pinned = obj.data.attributes.new(".pn.UVMap", 'BOOLEAN', 'CORNER')
+        pinned.data.foreach_set("value", np.isin(np.arange(len(obj.data.loops)), pins))
+    before = snapshot(obj)
+    assert bpy.ops.uv.qh_unwrap(**options) == {'FINISHED'}
+    assert changes(before, snapshot(obj)) <= {"UVMap", "active UV map"}, "nothing but the UVs"
+    return obj, last_report()
+
+
+def of_corners(faces, values):
+    """The values of the vertices at the faces' corners."""
+    return np.asarray(values)[np.concatenate(faces)]
+
+
+def by_vertex(faces, uv):
+    """The UVs of the vertices, which have one each."""
+    found = np.zeros((np.concatenate(faces).max() + 1, 2), dtype=np.float32)
+    found[np.concatenate(faces)] = uv
+    assert (found[np.concatenate(faces)] == uv).all()
+    return found
+
+
+def signed_area(corners):
+    x, y = corners.T
+    return (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
+
+
+# Winding
+
+
+@pytest.mark.parametrize("flipped", [[7], [0], [7, 8, 13, 14], range(1, 36, 2)])
+def test_faces_that_are_inside_out_do_not_matter(flipped):
+    points, faces = sheet()
+    straight, _ = unwrapped(points, faces)
+    expected = by_vertex(faces, uvs(straight))
+    mixed = [[face[0], *face[:0:-1]] if k in flipped else face for k, face in enumerate(faces)]
+    obj, (report,) = unwrapped(points, mixed)
+    text = f"{len(flipped)} face{' is' if len(flipped) == 1 else 's are'} inside out: turned for the unwrap"
+    assert report["warnings"] == [text] and report["injective"] and report["after"]["flips"] == 0
+    found = by_vertex(mixed, uvs(obj))
+    assert np.abs(found - expected).max() < 1e-2
+    assert sum(signed_area(corners) for corners in found[np.array(faces)]) > 0, "it is not mirrored"
+
+
+def test_the_majority_is_not_mirrored():
+    points, faces = sheet()
+    mixed = [[face[0], *face[:0:-1]] if k < 20 else face for k, face in enumerate(faces)]
+    obj, (report,) = unwrapped(points, mixed)
+    assert report["warnings"] == ["16 faces are inside out: turned for the unwrap"]
+    areas = [signed_area(corners) for corners in by_vertex(mixed, uvs(obj))[np.array(mixed)]]
+    assert sum(area > 0 for area in areas) == 20
+
+
+@pytest.mark.parametrize("triangulated", [False, True])
+def test_a_moebius_band_is_cut_and_certified(triangulated):
+    around, across = 40, 3
+    angle, height = np.meshgrid(
+        2 * np.pi * np.arange(around) / around, np.linspace(-0.4, 0.4, across + 1), indexing="ij"
+    )
+    radius = 2 + height * np.cos(angle / 2)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height * np.sin(angle / 2)], axis=2)
+
+    def vertex(i, j):
+        return i * (across + 1) + j if i < around else across - j
+
+    faces = [
+        [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)]
+        for i in range(around)
+        for j in range(across)
+    ]
+    if triangulated:
+        faces = [triangle for a, b, c, d in faces for triangle in ([a, b, c], [a, c, d])]
+    obj, (report,) = unwrapped(points.reshape(-1, 3), faces)
+    assert report["injective"] and report["after"]["flips"] == 0
+    (warning,) = report["warnings"]
+    assert warning.startswith("it is one-sided, like a Möbius band: cut at ")
+    assert warning.endswith(" edges; mark a seam across it to choose where")
+    kept = uvs(obj)
+    bpy.ops.uv.qh_unwrap(boundary='KEEP')
+    assert last_report()[0]["injective"], "it is cut at the same place again"
+    assert np.ptp(uvs(obj), axis=0) == pytest.approx(np.ptp(kept, axis=0), rel=1e-4)
