@@ -128,6 +128,10 @@ def _remarks(island):
     if island.one_sided_edges:
         edges = count(island.one_sided_edges, "edge")
         yield f"it is one-sided, like a Möbius band: cut at {edges}; mark a seam across it to choose where"
+    if island.doubled_faces == 1:
+        yield "1 doubled face takes the UVs of its twin, and is not counted as an overlap"
+    elif island.doubled_faces:
+        yield f"{island.doubled_faces} doubled faces take the UVs of their twins, and are not counted as overlaps"
     if island.crowded_edges:
         yield f"it ends at {count(island.crowded_edges, 'edge')} where more than two faces meet"
 
@@ -162,6 +166,9 @@ def _judge(works):
         work.outcome.after = distortion(work.vertices, work.triangles, uvs[k] * work.aspect)
         if work.is_redrawn:
             _judge_drawn(work, sign[piece == k])
+    for work, its_uv in zip(works, uvs, strict=True):
+        if work.island.doubled_faces:
+            _judge_doubled(work, orientation(its_uv, work.doubled))
 
     loops = [loop + start for work, start in zip(works, first, strict=True) for loop in work.loops]
     solid = sign != 0  # those without area do not count, unless they should have some
@@ -174,10 +181,22 @@ def _judge(works):
 
 def _judge_drawn(work, sign):
     """Count the flips and collapses of an island's faces in the triangles that Blender draws."""
-    has_area = areas_in_space(work.vertices, work.drawn) > 0
-    flips, collapsed = int((sign < 0).sum()), int(((sign == 0) & has_area).sum())
+    flips, collapsed = _wrong(work, work.drawn, sign)
     work.outcome.after = dataclasses.replace(work.outcome.after, flips=flips, collapsed=collapsed)
     if flips or collapsed:
         work.outcome.warnings += (
             "Blender cuts some of its neighbouring faces along the same diagonal: triangulate them",
         )
+
+
+def _judge_doubled(work, sign):
+    """Add the flips and collapses of doubled faces, which Blender may cut into other triangles than their twins."""
+    after = work.outcome.after
+    flips, collapsed = _wrong(work, work.doubled, sign)
+    work.outcome.after = dataclasses.replace(after, flips=after.flips + flips, collapsed=after.collapsed + collapsed)
+
+
+def _wrong(work, triangles, sign):
+    """How many of an island's triangles (t, 3) are flipped and how many collapsed, by their orientations (t,)."""
+    has_area = areas_in_space(work.vertices, triangles) > 0
+    return int((sign < 0).sum()), int(((sign == 0) & has_area).sum())

@@ -42,18 +42,28 @@ class Work:
         """(n, 2), None if there is no map or nothing in it; where the map is cut, of one of the corners."""
         if self.mesh.uv is None:
             return None
-        corner_uv = self.mesh.uv[self.island.corners]
+        corner_uv = self.mesh.uv[self._corners]
         if not np.isfinite(corner_uv).all() or not np.ptp(corner_uv, axis=0).any():
             return None
         return self.mesh.uv[self._source] * self.aspect
+
+    @property
+    def _corners(self):
+        """(k,) the mesh's corners whose old UVs count: all but those of doubled faces."""
+        return self.island.corners[: self.island.own_corners]
+
+    @property
+    def _corner_vertex(self):
+        """(k,) the island vertex of each of these."""
+        return self.island.corner_vertex[: self.island.own_corners]
 
     @cached_property
     def _source(self):
         """(n,) the mesh's corner that each vertex has its old UVs from, a pinned one if there is one."""
         source = np.empty(len(self.island.vertices), dtype=np.intp)
-        source[self.island.corner_vertex] = self.island.corners
-        pinned = self.mesh.pinned[self.island.corners]
-        source[self.island.corner_vertex[pinned]] = self.island.corners[pinned]
+        source[self._corner_vertex] = self._corners
+        pinned = self.mesh.pinned[self._corners]
+        source[self._corner_vertex[pinned]] = self._corners[pinned]
         return source
 
     @cached_property
@@ -91,7 +101,7 @@ class Work:
     @property
     def is_cut(self):
         """Whether the old UVs have cuts where there is no seam."""
-        gap = self.old_uv[self.island.corner_vertex] - self.mesh.uv[self.island.corners] * self.aspect
+        gap = self.old_uv[self._corner_vertex] - self.mesh.uv[self._corners] * self.aspect
         return np.abs(gap).max() > 1e-5 * np.ptp(self.old_uv, axis=0).max()
 
     @property
@@ -101,9 +111,18 @@ class Work:
 
     @cached_property
     def _drawn(self):
+        return self._of_corners(self.island.drawn_corners)
+
+    @property
+    def doubled(self):
+        """(s, 3) the triangles that Blender draws of its doubled faces, wound like their twins."""
+        return self._of_corners(self.island.doubled_corners)
+
+    def _of_corners(self, corners):
+        """The island's vertices at some of its corners."""
         vertex = np.empty(len(self.mesh.corner_vertex), dtype=np.intp)
         vertex[self.island.corners] = self.island.corner_vertex
-        return vertex[self.island.drawn_corners]
+        return vertex[corners]
 
     @cached_property
     def is_redrawn(self):

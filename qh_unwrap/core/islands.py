@@ -5,7 +5,8 @@ A *corner* is one vertex of one face; the corners of a face follow each other, a
 `corner_edge[c]`.  Corners become one UV vertex where faces hang together across an edge, and only there: so a seam
 inside an island opens it, and a vertex where two fans of faces merely touch is split.
 
-Faces that are inside out are turned for the unwrap, and what is one-sided is cut; the mesh stays as it is.
+A face on top of another one with the same corners is set aside, and gets its UVs.  Of the others, those that are inside
+out are turned for the unwrap, and what is one-sided is cut; the mesh stays as it is.
 """
 
 from dataclasses import dataclass, fields
@@ -13,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from .doubles import find_doubles
 from .pieces import components, first_and_last
 from .winding import agreed
 
@@ -21,14 +23,17 @@ from .winding import agreed
 class Island:
     """Faces that hang together; its n vertices are UV vertices, of which a mesh vertex may have several."""
 
-    faces: np.ndarray  # (f,) mesh faces
-    corners: np.ndarray  # (c,) mesh corners
+    faces: np.ndarray  # (f,) mesh faces, doubled ones too
+    corners: np.ndarray  # (c,) mesh corners, those of doubled faces at the end
     corner_vertex: np.ndarray  # (c,) island vertex of each of these corners
     vertices: np.ndarray  # (n,) mesh vertex of each island vertex
-    triangles: np.ndarray  # (t, 3) island vertices, all wound alike
+    triangles: np.ndarray  # (t, 3) island vertices, all wound alike; none of doubled faces
     triangle_corners: np.ndarray  # (t, 3) the same as mesh corners
     drawn_corners: np.ndarray  # (t, 3) the mesh's own triangles of the same faces, as mesh corners, wound like these
-    turned_faces: int  # faces that are inside out
+    doubled_corners: np.ndarray  # (s, 3) the mesh's own triangles of doubled faces, wound like their twins
+    own_corners: int  # how many of the corners are not of doubled faces
+    doubled_faces: int  # faces on top of another one with the same corners, whose UVs they get
+    turned_faces: int  # faces that are inside out, not counting doubled ones
     one_sided_edges: int  # edges where it is cut since it is one-sided
     crowded_edges: int  # edges of its outline where more than two faces meet
 
@@ -49,11 +54,15 @@ def find_islands(
     selected                    (f,) bool, the faces to split
     corner_triangles            (t, 3) the faces' triangles, as corners
 
-    Faces are neighbours across an edge that is no seam and that exactly two selected faces use.
+    Faces are neighbours across an edge that is no seam and that exactly two selected faces use; doubled ones do not
+    count.
     """
     corner_face, following = _around_faces(face_start, len(corner_vertex))
-    chosen_corners = np.flatnonzero(selected[corner_face])
-    one, start, end, opposed = _across_edges(corner_vertex, corner_edge, following, seam, chosen_corners)
+    doubles = find_doubles(corner_vertex, corner_edge, face_start, seam, selected)
+    is_double = doubles.among(len(face_start))
+    single, doubled = selected & ~is_double, selected & is_double
+    own_corners = np.flatnonzero(single[corner_face])
+    one, start, end, opposed = _across_edges(corner_vertex, corner_edge, following, seam, own_corners)
     here, there = corner_face[one], corner_face[start]
     face_island = components(len(face_start), here, there)[1]
     turned, cut = agreed(here, there, opposed, face_island)
@@ -61,16 +70,23 @@ def find_islands(
         one, start, end = (each[~cut] for each in (one, start, end))
     uv_vertex = _uv_vertices(one, start, end, following)
     triangles = _without_doubled_diagonals(corner_triangles, following, uv_vertex)
+
+    uv_vertex[doubles.corners] = uv_vertex[doubles.twins]
+    face_island[doubles.faces] = face_island[doubles.twin_faces]
+    backward = turned.copy()
+    backward[doubles.faces] = turned[doubles.twin_faces] ^ doubles.is_reversed
     triangle_face = corner_face[corner_triangles[:, 0]]
     drawn = corner_triangles
-    if turned.any():
-        triangles, drawn = (_turned(each, turned[triangle_face]) for each in (triangles, drawn))
+    if backward.any():
+        triangles, drawn = (_turned(each, backward[triangle_face]) for each in (triangles, drawn))
 
     rank, count = _ranks(face_island, selected)
     corner_rank, triangle_rank = rank[corner_face], rank[triangle_face]
     faces, face_starts = _grouped(np.flatnonzero(selected), rank, count)
-    corners, corner_starts = _grouped(chosen_corners, corner_rank, count)
-    its, triangle_starts = _grouped(np.flatnonzero(selected[triangle_face]), triangle_rank, count)
+    corners = np.concatenate([own_corners, np.flatnonzero(doubled[corner_face])])
+    corners, corner_starts = _grouped(corners, corner_rank, count)
+    its, triangle_starts = _grouped(np.flatnonzero(single[triangle_face]), triangle_rank, count)
+    its_doubled, doubled_starts = _grouped(np.flatnonzero(doubled[triangle_face]), triangle_rank, count)
     first_corner, vertex_starts, island_vertex = _vertices(uv_vertex, corners, corner_rank, count)
 
     def counted(faces):
@@ -84,9 +100,12 @@ def find_islands(
         "triangles": _split(island_vertex[triangles[its]], triangle_starts),
         "triangle_corners": _split(triangles[its], triangle_starts),
         "drawn_corners": _split(drawn[its], triangle_starts),
+        "doubled_corners": _split(drawn[its_doubled], doubled_starts),
+        "own_corners": np.bincount(corner_rank[own_corners], minlength=count).tolist(),
+        "doubled_faces": counted(doubled),
         "turned_faces": counted(turned),
         "one_sided_edges": counted(here[cut]),
-        "crowded_edges": _crowded_edges(corner_edge[chosen_corners], corner_rank[chosen_corners], seam, count),
+        "crowded_edges": _crowded_edges(corner_edge[own_corners], corner_rank[own_corners], seam, count),
     }
     in_order = (columns[field.name] for field in fields(Island))
     return [Island(*row) for row in zip(*in_order, strict=True)]
@@ -139,10 +158,8 @@ def cuts(
     tolerance: float = 1e-6,
 ) -> np.ndarray:
     """The edges, (e,) bool, where two faces meet in space and their corners' UVs (c, 2) do not."""
-    corners = np.arange(len(corner_vertex))
-    _, following = _around_faces(face_start, len(corners))
-    seam = np.zeros(edge_count, dtype=bool)
-    one, start, end, _ = _across_edges(corner_vertex, corner_edge, following, seam, corners)
+    seam, everything = np.zeros(edge_count, dtype=bool), np.ones(len(face_start), dtype=bool)
+    following, (one, start, end) = _neighbours(corner_vertex, corner_edge, face_start, seam, everything)
     cut = np.zeros(edge_count, dtype=bool)
     cut[corner_edge[one[_gaps(uv, one, start, end, following) > tolerance]]] = True
     return cut
@@ -157,15 +174,24 @@ def attached(
     uv: np.ndarray,
     tolerance: float = 1e-5,
 ) -> np.ndarray:
-    """The corners, (c,) bool, of selected faces that hang on unselected ones: no seam parts them, nor do the UVs."""
-    corners = np.arange(len(corner_vertex))
-    corner_face, following = _around_faces(face_start, len(corners))
-    one, start, end, _ = _across_edges(corner_vertex, corner_edge, following, seam, corners)
+    """The corners, (c,) bool, of selected faces that hang on unselected ones: no seam parts them, nor do the UVs.
+
+    A doubled face that is not selected holds nothing, nor does it count as one that hangs there.
+    """
+    following, (one, start, end) = _neighbours(corner_vertex, corner_edge, face_start, seam, selected)
     joined = _gaps(uv, one, start, end, following) <= tolerance
     uv_vertex = _uv_vertices(one[joined], start[joined], end[joined], following)
-    is_selected = selected[corner_face]
+    is_selected = selected[_around_faces(face_start, len(corner_vertex))[0]]
     unselected_there = np.bincount(uv_vertex, weights=~is_selected) > 0
     return is_selected & unselected_there[uv_vertex]
+
+
+def _neighbours(corner_vertex, corner_edge, face_start, seam, selected):
+    """The corner that follows each around its face, and what `_across_edges` returns of all faces but doubled ones."""
+    corner_face, following = _around_faces(face_start, len(corner_vertex))
+    doubles = find_doubles(corner_vertex, corner_edge, face_start, seam, selected)
+    corners = np.flatnonzero(~doubles.among(len(face_start))[corner_face])
+    return following, _across_edges(corner_vertex, corner_edge, following, seam, corners)[:3]
 
 
 def _gaps(uv, one, start, end, following):

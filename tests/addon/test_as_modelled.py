@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes as they come: faces inside out, one-sided bands."""
+"""Meshes as they come: faces inside out, one-sided bands, faces on top of each other."""
 
 import bpy  # isort: skip
 import numpy as np
@@ -106,3 +106,82 @@ def test_a_moebius_band_is_cut_and_certified(triangulated):
     bpy.ops.uv.qh_unwrap(boundary='KEEP')
     assert last_report()[0]["injective"], "it is cut at the same place again"
     assert np.ptp(uvs(obj), axis=0) == pytest.approx(np.ptp(kept, axis=0), rel=1e-4)
+
+
+# Doubled faces
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("number", [14, 0])
+def test_a_doubled_face_takes_the_uvs_of_its_twin(way, number):
+    points, faces = sheet()
+    straight, _ = unwrapped(points, faces)
+    expected = by_vertex(faces, uvs(straight))
+    again = [*faces, np.roll(faces[number][::way], 1).tolist()]
+    obj, (report,) = unwrapped(points, again)
+    assert (by_vertex(again, uvs(obj)) == expected).all()
+    assert report["warnings"] == ["1 doubled face takes the UVs of its twin, and is not counted as an overlap"]
+    assert report["face_indices"] == list(range(37)) and report["injective"] and report["after"]["flips"] == 0
+
+
+@pytest.mark.parametrize("triangulated", [False, True])
+def test_a_double_sided_sheet_is_one_clean_island(triangulated):
+    points, faces = sheet()
+    if triangulated:
+        faces = [triangle for a, b, c, d in faces for triangle in ([a, b, c], [a, c, d])]
+    both = [*faces, *(face[::-1] for face in faces)]
+    obj, (report,) = unwrapped(points, both)
+    count = len(faces)
+    text = f"{count} doubled faces take the UVs of their twins, and are not counted as overlaps"
+    assert report["warnings"] == [text] and report["injective"]
+    assert report["face_indices"] == list(range(2 * count))
+    straight, _ = unwrapped(points, faces)
+    assert (by_vertex(both, uvs(obj)) == by_vertex(faces, uvs(straight))).all()
+
+
+def test_doubled_faces_inside_out_are_turned_with_their_twins():
+    points, faces = sheet()
+    faces[3] = faces[3][::-1]
+    again = [*faces, faces[3], faces[3][::-1]]
+    _, (report,) = unwrapped(points, again)
+    assert report["warnings"] == [
+        "1 face is inside out: turned for the unwrap",
+        "2 doubled faces take the UVs of their twins, and are not counted as overlaps",
+    ]
+    assert report["injective"] and report["after"]["flips"] == 0
+
+
+def test_what_blender_draws_of_a_doubled_face_is_judged():
+    """A quad that is an arrowhead in the map: cut along its other diagonal, one half of it is flipped."""
+    points = [(0, 0, 0), (1, -0.3, 0.2), (2, 0, 0), (1, 1, 0)]
+    uv = [(0, 0), (1, 0.6), (2, 0), (1, 1)]
+    for double, flips in (([1, 2, 3, 0], 0), ([0, 1, 2, 3], 1)):
+        faces = [[1, 2, 3, 0], double]
+        _, (report,) = unwrapped(points, faces, of_corners(faces, uv), boundary='KEEP')
+        assert (report["after"]["flips"], report["injective"]) == (flips, not flips)
+
+
+def test_pins_of_a_doubled_face_count_and_its_uvs_do_not():
+    points, faces = sheet()
+    again = [*faces, faces[0][::-1], faces[35][::-1]]
+    uv = of_corners(again, points[:, :2])
+    uv[144:] += 7  # the doubles lie elsewhere
+    pins = [144, 145, 148]  # corners of the doubles
+    obj, (report,) = unwrapped(points, again, uv, pins=pins)
+    pinned = [again[36][0], again[36][1], again[37][0]]
+    found = by_vertex(again, uvs(obj))
+    assert (found[pinned] == points[pinned, :2].astype(np.float32)).all()
+    assert report["injective"] and report["before"]["flips"] == 0
+    free = by_vertex(faces, uvs(unwrapped(points, faces)[0]))
+    assert np.abs(found - free).max() > 1e-4
+
+
+def test_a_kept_outline_is_that_of_the_first_faces():
+    points, faces = sheet()
+    again = [*faces, *(face[::-1] for face in faces)]
+    uv = of_corners(again, points[:, :2])
+    uv[144:] *= 0.3
+    obj, (report,) = unwrapped(points, again, uv, boundary='KEEP')
+    assert report["injective"]
+    rim = (np.isin(points[:, :2], (0, 1))).any(axis=1)
+    assert (by_vertex(again, uvs(obj))[rim] == points[rim, :2].astype(np.float32)).all()

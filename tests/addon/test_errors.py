@@ -51,10 +51,6 @@ def scaled_to_nothing():
     return obj
 
 
-def doubled():
-    return mesh_object("Doubled", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2], [0, 1, 2]])
-
-
 def without_uvs():
     return add_grid(3, uv=False)
 
@@ -91,7 +87,6 @@ def pinned():
         (not_a_number, {}, "1 vertex has coordinates that are no numbers"),
         (flat_to_a_line, {}, "all its faces have zero area"),
         (scaled_to_nothing, {}, "all its faces have zero area"),
-        (doubled, {}, "on top of another with the same corners: delete the duplicates"),
         (without_uvs, {"boundary": 'KEEP'}, "a kept boundary needs UVs, and there are none"),
         (without_uvs, {"initial": 'CURRENT', "boundary": 'CIRCLE'}, "to start from the current UVs there must be some"),
         (self_crossing, {"boundary": 'KEEP'}, "the UVs' outline crosses itself"),

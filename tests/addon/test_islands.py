@@ -2,8 +2,6 @@
 import numpy as np
 import pytest
 
-from qh_unwrap.core.chart import Surface
-from qh_unwrap.core.errors import DuplicateError
 from qh_unwrap.core.islands import attached, cuts, find_islands
 from qh_unwrap.core.topology import Topology
 
@@ -193,10 +191,77 @@ def test_one_sided_and_two_sided_islands_side_by_side():
     assert (one.one_sided_edges, other.one_sided_edges) == (0, 0) and third.one_sided_edges > 0
 
 
-def test_duplicate_faces_stay_together():
-    (island,) = split([[0, 1, 2], [0, 1, 2]])
-    with pytest.raises(DuplicateError):
-        Surface(np.eye(3), island.triangles)
+@pytest.mark.parametrize("size", [3, 4, 6])
+@pytest.mark.parametrize("turns", range(3))
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_doubled_face_takes_the_vertices_of_its_twin(size, turns, way):
+    face = [5, 2, 8, 1, 9, 4][:size]
+    (island,) = split([face, np.roll(face[::way], turns).tolist()])
+    assert list(island.faces) == [0, 1] and island.doubled_faces == 1 and not island.turned_faces
+    assert island.own_corners == size and len(island.vertices) == size and len(island.triangles) == size - 2
+    corner_vertex = mesh([face, np.roll(face[::way], turns).tolist()])[0]
+    assert np.array_equal(island.vertices[island.corner_vertex], corner_vertex[island.corners])
+    assert np.array_equal(island.corners, range(2 * size))
+    assert len(island.doubled_corners) == size - 2
+    number = np.empty(2 * size, int)
+    number[island.corners] = island.corner_vertex
+    all_triangles = np.vstack([island.triangles, number[island.doubled_corners][:, ::-1]])
+    closed = Topology(all_triangles, size)
+    assert closed.is_closed and (size > 3 or not closed.misaligned.any()), "they are wound like their twins"
+
+
+@pytest.mark.parametrize("again", [[(12, 1)], [(12, -1)], [(0, 1)], [(0, -1)], [(3, 1), (3, -1), (4, 1)]])
+def test_doubled_faces_do_not_part_a_grid(again):
+    faces = grid(5)
+    (island,) = split(faces + [faces[k][::way] for k, way in again])
+    (alone,) = split(faces)
+    assert island.doubled_faces == len(again) and len(island.faces) == 25 + len(again)
+    for name in ("vertices", "triangles", "triangle_corners", "drawn_corners"):
+        assert np.array_equal(getattr(island, name), getattr(alone, name))
+    assert (island.crowded_edges, island.turned_faces) == (0, 0)
+
+
+def test_a_double_sided_sheet_is_one_island():
+    faces = grid(5)
+    random = np.random.default_rng(0)
+    backs = [np.roll(face[::-1], random.integers(4)).tolist() for face in faces]
+    both = [(faces + backs)[k] for k in random.permutation(50)]
+    (island,) = split(both)
+    assert island.doubled_faces == 25 and len(island.triangles) == 50 and sorted(island.vertices) == list(range(36))
+    assert run_against_each_other(island.triangles) == 0
+    front, back = split(both[:1] + both), split(both)
+    assert front[0].doubled_faces == 26 and len(back) == 1
+
+
+def test_faces_with_the_same_vertices_in_another_order_are_not_doubled():
+    assert all(island.doubled_faces == 0 for island in split([[0, 1, 2, 3], [0, 2, 1, 3]]))
+
+
+def test_only_selected_faces_count_as_doubled():
+    faces = grid(3)
+    both = [face[::-1] for face in faces] + faces
+    (island,) = split(both, selected=range(9, 18))
+    assert island.doubled_faces == 0 and list(island.faces) == list(range(9, 18))
+
+
+def test_a_pillow_is_opened_by_its_seams():
+    pillow = [[0, 1, 2, 3], [3, 2, 1, 0]]
+    (opened,) = split(pillow, [(0, 1), (1, 2), (2, 3)])
+    assert opened.doubled_faces == 0 and len(opened.triangles) == 4 and len(opened.vertices) == 6
+    assert len(split(pillow, [(0, 1), (1, 2), (2, 3), (3, 0)])) == 2
+    (doubled,) = split(pillow)
+    assert doubled.doubled_faces == 1
+
+
+def test_the_rest_of_a_double_sided_sheet_holds_nothing():
+    faces = grid(3)
+    corner_vertex, corner_edge, start, seam, _ = mesh(faces + [face[::-1] for face in faces])
+    uv = np.array([(i, j) for i in range(4) for j in range(4)], dtype=float)[corner_vertex]
+    for selected in (np.arange(18) < 9, np.arange(18) >= 9):
+        assert not attached(corner_vertex, corner_edge, start, seam, selected, uv).any()
+    column = np.arange(18) < 3
+    found = attached(corner_vertex, corner_edge, start, seam, column, uv)
+    assert set(corner_vertex[found]) == {4, 5, 6, 7}
 
 
 def test_attached_corners():
