@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core import Settings, Shape, UnwrapError, distortion, placing, unwrap_islands
 from ..core.certificate import are_injective, orientation
+from ..core.contacts import touches_along_seams_only
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import attached, find_islands
 from ..core.pieces import joined, numbers
@@ -174,9 +175,15 @@ def _judge(works):
     solid = sign != 0  # those without area do not count, unless they should have some
     loop_piece = np.repeat(np.arange(len(works)), [len(work.loops) for work in works])
     certified = are_injective(uv, triangles[solid], piece[solid], loops, loop_piece)
-    for work, certain in zip(works, certified.tolist(), strict=True):
-        after = work.outcome.after
-        work.outcome.injective = certain and not (after.flips or after.collapsed)
+    flipped = np.zeros(len(works), dtype=bool)
+    flipped[piece[sign < 0]] = True
+    for work, its_uv, certain, upside_down in zip(works, uvs, certified.tolist(), flipped.tolist(), strict=True):
+        after, outcome = work.outcome.after, work.outcome
+        outcome.injective = not (after.flips or after.collapsed or upside_down)
+        if outcome.injective and not certain:
+            outcome.injective = touches_along_seams_only(its_uv, work.loops, work.place)
+            if outcome.injective:
+                outcome.warnings += ("it touches itself along a seam, and covers nothing twice",)
 
 
 def _judge_drawn(work, sign):

@@ -79,6 +79,11 @@ class Work:
         return self.mesh.vertices[self.island.vertices]
 
     @property
+    def place(self):
+        """(n,) a number for the place in space of each vertex: those on both sides of a seam have the same."""
+        return np.unique(self.vertices, axis=0, return_inverse=True)[1].ravel()
+
+    @property
     def triangles(self):
         return self.island.triangles
 

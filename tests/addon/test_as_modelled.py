@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes as they come: faces inside out, one-sided bands, faces on top of each other."""
+"""Meshes as they come: faces inside out, one-sided bands, faces on top of each other, seams marked on good maps."""
 
 import bpy  # isort: skip
 import numpy as np
@@ -185,3 +185,30 @@ def test_a_kept_outline_is_that_of_the_first_faces():
     assert report["injective"]
     rim = (np.isin(points[:, :2], (0, 1))).any(axis=1)
     assert (by_vertex(again, uvs(obj))[rim] == points[rim, :2].astype(np.float32)).all()
+
+
+# Slits
+
+
+def seam_edges(first, count):
+    """That many edges along a row of the sheet of 12 quads a side."""
+    return {(first + k, first + k + 1) for k in range(count)}
+
+
+@pytest.mark.parametrize("seams", [seam_edges(6 * 13, 6), seam_edges(6 * 13 + 3, 5)])
+@pytest.mark.parametrize("options", [{"boundary": 'KEEP'}, {"pins": [0, 575]}])
+def test_a_slit_that_stays_closed_is_no_overlap(seams, options):
+    points, faces = sheet(12)
+    points[:, 2] = 0
+    _, (report,) = unwrapped(points, faces, of_corners(faces, points[:, :2]), seams, **options)
+    assert report["injective"] and "it touches itself along a seam, and covers nothing twice" in report["warnings"]
+    assert not any("overlaps" in warning for warning in report["warnings"])
+
+
+def test_what_touches_elsewhere_is_not_certified():
+    """The outline's corner lies on an inner point's place, so that the faces there lie on others."""
+    points, faces = sheet(12)
+    values = points[:, :2].copy()
+    values[0] = values[5 * 13 + 5]
+    _, (report,) = unwrapped(points, faces, of_corners(faces, values), boundary='KEEP')
+    assert not report["injective"]
