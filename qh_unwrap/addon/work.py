@@ -106,8 +106,9 @@ class Work:
     @property
     def is_cut(self):
         """Whether the old UVs have cuts where there is no seam."""
-        gap = self.old_uv[self._corner_vertex] - self.mesh.uv[self._corners] * self.aspect
-        return np.abs(gap).max() > 1e-5 * np.ptp(self.old_uv, axis=0).max()
+        old, corner_uv = self.old_uv, self.mesh.uv[self._corners] * self.aspect
+        tolerance = 1e-5 * np.ptp(old, axis=0).max() + 4 * np.finfo(np.float32).eps * np.abs(old).max()
+        return np.abs(old[self._corner_vertex] - corner_uv).max() > tolerance
 
     @property
     def drawn(self):

@@ -18,6 +18,9 @@ from .doubles import find_doubles
 from .pieces import components, first_and_last
 from .winding import agreed
 
+_SMALL = 1e-4  # of an edge's length in the map, up to which a gap there is none
+_ROUNDING = 4 * float(np.finfo(np.float32).eps)  # of a UV, by which its copies may differ
+
 
 @dataclass(frozen=True)
 class Island:
@@ -150,18 +153,13 @@ def _turned(triangles, backward):
 
 
 def cuts(
-    corner_vertex: np.ndarray,
-    corner_edge: np.ndarray,
-    face_start: np.ndarray,
-    edge_count: int,
-    uv: np.ndarray,
-    tolerance: float = 1e-6,
+    corner_vertex: np.ndarray, corner_edge: np.ndarray, face_start: np.ndarray, edge_count: int, uv: np.ndarray
 ) -> np.ndarray:
     """The edges, (e,) bool, where two faces meet in space and their corners' UVs (c, 2) do not."""
     seam, everything = np.zeros(edge_count, dtype=bool), np.ones(len(face_start), dtype=bool)
     following, (one, start, end) = _neighbours(corner_vertex, corner_edge, face_start, seam, everything)
     cut = np.zeros(edge_count, dtype=bool)
-    cut[corner_edge[one[_gaps(uv, one, start, end, following) > tolerance]]] = True
+    cut[corner_edge[one[~_meet(uv, one, start, end, following)]]] = True
     return cut
 
 
@@ -172,14 +170,13 @@ def attached(
     seam: np.ndarray,
     selected: np.ndarray,
     uv: np.ndarray,
-    tolerance: float = 1e-5,
 ) -> np.ndarray:
     """The corners, (c,) bool, of selected faces that hang on unselected ones: no seam parts them, nor do the UVs.
 
     A doubled face that is not selected holds nothing, nor does it count as one that hangs there.
     """
     following, (one, start, end) = _neighbours(corner_vertex, corner_edge, face_start, seam, selected)
-    joined = _gaps(uv, one, start, end, following) <= tolerance
+    joined = _meet(uv, one, start, end, following)
     uv_vertex = _uv_vertices(one[joined], start[joined], end[joined], following)
     is_selected = selected[_around_faces(face_start, len(corner_vertex))[0]]
     unselected_there = np.bincount(uv_vertex, weights=~is_selected) > 0
@@ -194,9 +191,20 @@ def _neighbours(corner_vertex, corner_edge, face_start, seam, selected):
     return following, _across_edges(corner_vertex, corner_edge, following, seam, corners)[:3]
 
 
-def _gaps(uv, one, start, end, following):
-    """How far the UVs of two faces lie apart at most along the edges that `_across_edges` returns, (k,)."""
-    return np.abs(np.hstack([uv[one] - uv[start], uv[following[one]] - uv[end]])).max(axis=1)
+def _meet(uv, one, start, end, following):
+    """Whether the UVs of two faces are the same along each of the edges that `_across_edges` returns, (k,) bool.
+
+    They may differ by some rounding, and by a small part of the edge's length.
+    """
+    corners = np.column_stack([one, following[one], start, end])
+    meet = (uv[corners[:, :2]] == uv[corners[:, 2:]]).all(axis=(1, 2))
+    different = np.flatnonzero(~meet)
+    here, there = uv[corners[different, :2]], uv[corners[different, 2:]]
+    with np.errstate(invalid="ignore", over="ignore"):
+        length = np.abs(here[:, 0] - here[:, 1]).max(axis=1)
+        size = np.abs(np.hstack([here, there])).max(axis=(1, 2))
+        meet[different] = np.abs(here - there).max(axis=(1, 2)) <= _SMALL * length + _ROUNDING * size
+    return meet
 
 
 def _around_faces(face_start, corner_count):

@@ -4,9 +4,11 @@
 import bpy  # isort: skip
 import numpy as np
 import pytest
-from scenes import changes, mesh_object, snapshot, uvs
+from scenes import add_grid, changes, mesh_object, snapshot, uvs
 
 from qh_unwrap import last_report
+from qh_unwrap.addon import mesh_arrays
+from qh_unwrap.core.islands import attached
 
 
 def sheet(size=6):
@@ -212,3 +214,34 @@ def test_what_touches_elsewhere_is_not_certified():
     values[0] = values[5 * 13 + 5]
     _, (report,) = unwrapped(points, faces, of_corners(faces, values), boundary='KEEP')
     assert not report["injective"]
+
+
+# Maps of any size
+
+
+@pytest.mark.parametrize(("scale", "tile"), [(1e-5, 0), (1e-3, 9), (1, 9), (1, 100), (100, 0)])
+def test_a_map_of_any_size_anywhere_is_kept(scale, tile):
+    points, faces = sheet()
+    values = points[:, :2] * scale + (tile, 0)
+    obj, (report,) = unwrapped(points, faces, of_corners(faces, values), boundary='KEEP')
+    assert report["injective"]
+    rim = np.isin(points[:, :2], (0, 1)).any(axis=1)
+    assert (by_vertex(faces, uvs(obj))[rim] == values[rim].astype(np.float32)).all()
+    cut = of_corners(faces, values)
+    cut[72:] += 0.2 * scale
+    with pytest.raises(RuntimeError, match="cut where there is no seam"):
+        unwrapped(points, faces, cut, boundary='KEEP')
+
+
+def test_selected_faces_of_a_small_map_hang_on_the_others_only_where_it_is_whole():
+    obj = add_grid(4)
+    layer = obj.data.uv_layers.active.uv
+    whole = uvs(obj) * np.float32(1e-5)
+    selected = np.arange(16) < 8
+    for gap, expected in ((0, True), (2e-6, False)):
+        moved = whole.copy()
+        moved[32:] += np.float32(gap)
+        layer.foreach_set("vector", moved.ravel())
+        mesh = mesh_arrays.read(obj)
+        found = attached(mesh.corner_vertex, mesh.corner_edge, mesh.face_start, mesh.seam, selected, mesh.uv)
+        assert found.any() == expected

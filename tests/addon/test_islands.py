@@ -331,6 +331,32 @@ def test_every_selected_corner_is_in_one_island(seed):
         assert len(island.triangles) == 2 * len(island.faces)
 
 
+@pytest.mark.parametrize("scale", [1e-6, 1e-5, 1e-3, 1, 1e4])
+@pytest.mark.parametrize("tile", [0, 1, 9, 100])
+def test_cuts_and_attachments_do_not_depend_on_scale_and_tile(scale, tile):
+    if tile and scale < 1e-3:
+        pytest.skip("32-bit floats there are too coarse")
+    corner_vertex, corner_edge, start, seam, _ = mesh(grid(3))
+    points = np.array([(i, j) for i in range(4) for j in range(4)], dtype=float) / 3
+    uv = points[corner_vertex]
+    selected = np.arange(9) < 3
+
+    def stored(uv):
+        return (uv * scale + [tile, 0]).astype(np.float32).astype(float)
+
+    assert not cuts(corner_vertex, corner_edge, start, len(seam), stored(uv)).any()
+    assert attached(corner_vertex, corner_edge, start, seam, selected, stored(uv)).sum() == 6
+    for gap in (0.5, 0.05):
+        parted = uv.copy()
+        parted[12:] += gap
+        assert cuts(corner_vertex, corner_edge, start, len(seam), stored(parted)).sum() == 3
+        assert not attached(corner_vertex, corner_edge, start, seam, selected, stored(parted)).any()
+    nearly = np.nextafter(stored(uv).astype(np.float32), np.float32(1e9)).astype(float)
+    nearly[12:] = stored(uv)[12:]
+    assert not cuts(corner_vertex, corner_edge, start, len(seam), nearly).any()
+    assert attached(corner_vertex, corner_edge, start, seam, selected, nearly).sum() == 6
+
+
 def test_cuts_are_where_uvs_part():
     corner_vertex, corner_edge, start, seam, _ = mesh(grid(2))
     points = np.array([(i, j) for i in range(3) for j in range(3)], dtype=float)
