@@ -97,6 +97,8 @@ def _shape(work):
         elif settings.boundary != 'KEEP':
             settings = dataclasses.replace(settings, boundary='KEEP')
             work.outcome.warnings += ("its outline is kept, since faces that are not selected hang on it",)
+    if work.uv_fault and (settings.boundary == 'KEEP' or settings.initial == 'CURRENT'):
+        raise UVError(f"{work.uv_fault}: unwrap it once without keeping or starting from them")
     work.in_frame = settings.boundary == 'KEEP' or (settings.boundary == 'FREE' and bool(pinned.any()))
     if uv is not None and work.is_cut:
         if work.in_frame or settings.initial == 'CURRENT':

@@ -40,12 +40,17 @@ class Work:
     @cached_property
     def old_uv(self):
         """(n, 2), None if there is no map or nothing in it; where the map is cut, of one of the corners."""
-        if self.mesh.uv is None:
-            return None
-        corner_uv = self.mesh.uv[self._corners]
-        if not np.isfinite(corner_uv).all() or not np.ptp(corner_uv, axis=0).any():
+        if self.mesh.uv is None or self.uv_fault:
             return None
         return self.mesh.uv[self._source] * self.aspect
+
+    @cached_property
+    def uv_fault(self):
+        """Why the map has no UVs for it though there is a map, or an empty text."""
+        corner_uv = np.empty((0, 2)) if self.mesh.uv is None else self.mesh.uv[self._corners]
+        if not np.isfinite(corner_uv).all():
+            return "its UVs are no numbers (NaN or infinite)"
+        return "its UVs all lie in one point" if len(corner_uv) and not np.ptp(corner_uv, axis=0).any() else ""
 
     @property
     def _corners(self):

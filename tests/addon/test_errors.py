@@ -69,6 +69,20 @@ def no_area():
     return obj
 
 
+def uv_that_is_no_number():
+    obj = add_grid(3)
+    values = uvs(obj)
+    values[5] = np.nan
+    set_uvs(obj, values)
+    return obj
+
+
+def uvs_in_one_point():
+    obj = add_grid(3)
+    set_uvs(obj, uvs(obj) * 0 + 0.5)
+    return obj
+
+
 def pinned():
     obj = add_grid(3)
     bpy.ops.object.mode_set(mode='EDIT')
@@ -89,6 +103,9 @@ def pinned():
         (scaled_to_nothing, {}, "all its faces have zero area"),
         (without_uvs, {"boundary": 'KEEP'}, "a kept boundary needs UVs, and there are none"),
         (without_uvs, {"initial": 'CURRENT', "boundary": 'CIRCLE'}, "to start from the current UVs there must be some"),
+        (uv_that_is_no_number, {"boundary": 'KEEP'}, "its UVs are no numbers (NaN or infinite): unwrap it once"),
+        (uv_that_is_no_number, {"initial": 'CURRENT'}, "its UVs are no numbers (NaN or infinite): unwrap it once"),
+        (uvs_in_one_point, {"boundary": 'KEEP'}, "its UVs all lie in one point: unwrap it once without keeping"),
         (self_crossing, {"boundary": 'KEEP'}, "the UVs' outline crosses itself"),
         (no_area, {"boundary": 'KEEP'}, "outline encloses no area"),
         (pinned, {"boundary": 'CIRCLE'}, "pins need the boundary"),
