@@ -121,11 +121,12 @@ def _island_uv(island, mesh):
 
 def _edges(island, mesh):
     """The faces' edges (e, 2) as island vertices, and which of them are the island's outline."""
-    starts = np.isin(island.corners, mesh.face_start)
+    corners, vertex = island.corners[: island.own_corners], island.corner_vertex[: island.own_corners]
+    starts = np.isin(corners, mesh.face_start)
     first = np.flatnonzero(starts)
     following = np.arange(1, len(starts) + 1)
     following[np.append(first[1:], len(starts)) - 1] = first
-    ends = np.sort(np.column_stack([island.corner_vertex, island.corner_vertex[following]]), axis=1)
+    ends = np.sort(np.column_stack([vertex, vertex[following]]), axis=1)
     edges, uses = np.unique(ends, axis=0, return_counts=True)
     return edges, uses == 1
 

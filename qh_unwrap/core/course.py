@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from functools import partial
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -252,10 +253,9 @@ class Course:
             missing &= ~crossed | still
         for within in self._portions(pieces & ~missing):
             its = [airs[k] for k in np.flatnonzero(within)]
-            made = self._group(
-                within, start, lambda surface, uv, fixed, its=its: Plane(surface, uv, fixed, its, self._triangulate)
+            yield from self._improve(
+                self._group(within, start, partial(Plane, airs=its, triangulate=self._triangulate))
             )
-            yield from self._improve(made)
         if missing.any():
             for k in np.flatnonzero(missing):
                 text = "the outline stays as it is: there is no room to free it"
@@ -307,9 +307,7 @@ class Course:
             if len(airs) < len(everything):
                 yield from self._in_air(everything, with_pins(batch.surface, best, batch.uv, batch.pinned))
                 return
-            group = self._group(
-                everything, best, lambda surface, uv, fixed: Plane(surface, uv, fixed, airs, self._triangulate)
-            )
+            group = self._group(everything, best, partial(Plane, airs=airs, triangulate=self._triangulate))
         else:
             group.uv, _ = group.domain.recalled(group.uv, best, everything)
             group.domain.fix(batch.fixed, group.uv)

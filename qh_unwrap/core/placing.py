@@ -20,7 +20,8 @@ def says_where(corners: np.ndarray) -> bool:
     if not np.isfinite(corners).all():
         return False
     area = np.abs(signed_areas(corners)).sum()
-    return bool(1e-12 < area <= 1.01 * np.prod(np.ptp(corners.reshape(-1, 2), axis=0)))
+    extent = np.prod(np.ptp(corners.reshape(-1, 2), axis=0))
+    return bool(1e-6 * extent < area <= 1.01 * extent)
 
 
 def in_place(uv: np.ndarray, triangles: np.ndarray, old: np.ndarray) -> np.ndarray:
