@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes to arrays, and UVs back, in bulk; writing touches nothing but the UVs it is given."""
 
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -35,7 +34,7 @@ class MeshArrays:
 def read(obj, options=None):
     """The object's mesh as arrays, in any mode; does not change it."""
     options = options or MeshOptions()
-    layer = obj.data.uv_layers.active
+    layer = _active_map(obj.data)
     name = layer.name if layer else None
     if obj.mode != 'EDIT':
         return _read(obj, obj.data, name, options)
@@ -144,7 +143,7 @@ def _aspect(material):
 
 
 def write(obj, corners, uv):
-    """Give the corners their UVs, in a new map "UVMap" if there is none.  Call it `in_object_mode`."""
+    """Give the corners their UVs, in a new map "UVMap" if there is none.  Call it within `modes.in_object_mode`."""
     mesh = obj.data
     layer = _active_or_new_map(mesh)
     if layer is None:
@@ -158,27 +157,10 @@ def write(obj, corners, uv):
     mesh.update()
 
 
+def _active_map(mesh):
+    """The map that Blender works on, None if there is none: where none is active, as Blender 5 allows, the first."""
+    return mesh.uv_layers.active or (mesh.uv_layers[0] if len(mesh.uv_layers) else None)
+
+
 def _active_or_new_map(mesh):
-    return mesh.uv_layers.active or mesh.uv_layers.new(name="UVMap")
-
-
-@contextmanager
-def in_object_mode(context):
-    """Leave Edit Mode for a moment: the same objects return to it, with the same selection of objects."""
-    if context.mode != 'EDIT_MESH':
-        yield
-        return
-    view_layer = context.view_layer
-    editing, selected = list(context.objects_in_mode), list(view_layer.objects.selected)
-    bpy.ops.object.mode_set(mode='OBJECT')
-    try:
-        yield
-    finally:
-        _select(view_layer, editing)
-        bpy.ops.object.mode_set(mode='EDIT')
-        _select(view_layer, selected)
-
-
-def _select(view_layer, objects):
-    for obj in view_layer.objects:
-        obj.select_set(obj in objects, view_layer=view_layer)
+    return _active_map(mesh) or mesh.uv_layers.new(name="UVMap")

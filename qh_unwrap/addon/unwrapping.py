@@ -16,7 +16,7 @@ from ..core.islands import attached, find_islands
 from ..core.pieces import joined, numbers
 from ..core.stepping import mapped
 from ..core.triangles import areas_in_space
-from . import layout, mesh_arrays
+from . import layout, mesh_arrays, modes
 from .options import MeshOptions
 from .outcome import Outcome, count, latest
 from .selection import Target
@@ -46,7 +46,7 @@ def unwrap_targets(
         if placed:
             if options.placement != 'UNIT':
                 layout.report_overlaps(placed, works)
-            with mesh_arrays.in_object_mode(context):
+            with modes.in_object_mode(context):
                 for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
                     _write(obj, list(group))
     latest[:] = outcomes
