@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core import UnwrapError
 from .options import MeshOptions
+from .shown_shape import shown_vertices
 
 
 @dataclass(frozen=True)
@@ -57,9 +58,7 @@ def is_as_read(obj, arrays):
 
 
 def _read(obj, mesh, uv_name, options):
-    vertices = _get(mesh.vertices, "co", np.float32, 3)
-    if options.use_subsurf_data:
-        vertices = _smoothed(obj, mesh, vertices)
+    vertices = shown_vertices(obj, mesh, options.use_subsurf_data)
     shown = np.array(obj.matrix_world.to_3x3()) if options.correct_scale else np.eye(3)
     uv, pinned = None, np.zeros(len(mesh.loops), dtype=bool)
     if uv_name is not None:
@@ -98,30 +97,6 @@ def _corner_triangles(mesh):
         return np.arange(len(mesh.loops), dtype=np.int32).reshape(-1, 3)
     mesh.calc_loop_triangles()
     return _get(mesh.loop_triangles, "loops", np.int32, 3)
-
-
-def _smoothed(obj, mesh, vertices):
-    """Where the object's Subdivision Surface modifier, on its own, takes the vertices of its `mesh`."""
-    modifier = next((one for one in obj.modifiers if one.type == 'SUBSURF' and one.show_viewport), None)
-    if modifier is None:
-        return vertices
-    copy = mesh.copy()
-    scene = bpy.data.scenes.new("QH Unwrap")
-    try:
-        twin = bpy.data.objects.new("QH Unwrap", copy)
-        twin.shape_key_clear()
-        scene.collection.objects.link(twin)
-        alone = twin.modifiers.new(modifier.name, 'SUBSURF')
-        for setting in alone.bl_rna.properties:
-            if not setting.is_readonly:
-                setattr(alone, setting.identifier, getattr(modifier, setting.identifier))
-        view_layer = scene.view_layers[0]
-        view_layer.update()
-        smooth = twin.evaluated_get(view_layer.depsgraph).data
-        return _get(smooth.vertices, "co", np.float32, 3)[: len(vertices)]  # the new ones follow the old
-    finally:
-        bpy.data.scenes.remove(scene)
-        bpy.data.meshes.remove(copy)
 
 
 def _aspects(obj, mesh):
