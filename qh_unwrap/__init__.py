@@ -24,7 +24,8 @@ def last_report():
     """What became of every island of the latest run, in Blender or by the command line: a list of dictionaries.
 
     Each has `object`, `island` (its number), `faces` (how many), `face_indices` and either `error` or `before`,
-    `after`, `iterations`, `converged`, `injective`, `overlaps` and `warnings`, as in the command line's JSON.
+    `after`, `iterations`, `converged`, `injective`, `overlaps` (some of what it lies on now), `more_overlaps` (how many
+    more were found) and `warnings`, as in the command line's JSON.
     """
     from .addon import outcome
 

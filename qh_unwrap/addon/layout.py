@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the unwrapped islands go, and what lies on what then."""
+"""Where the unwrapped islands go."""
 
 import itertools
 
 import numpy as np
 
 from ..core import UnwrapError, placing
-from ..core.overlaps import overlap, overlapping
 from . import packing
 
 
@@ -62,33 +61,20 @@ def _others(works, all_works):
             yield work.uv / work.aspect
         elif id(work) not in mine and work.old_triangles is not None:
             yield work.old_uv / work.aspect
-    yield from (rest.reshape(-1, 2) for _, rest in _rests(all_works))
+    yield from (rest.reshape(-1, 2) for _, rest, _ in left_alone(all_works))
 
 
-def _rests(works):
-    """For each mesh, the faces that are not to be unwrapped, as triangles (t, 3, 2), where their UVs mean anything."""
+def left_alone(works):
+    """The faces that are not unwrapped, of each mesh and image those whose UVs mean anything.
+
+    Yields the object, their UVs as triangles (t, 3, 2), and the image.
+    """
     for obj, group in itertools.groupby(works, key=lambda work: work.target.obj):
         work = next(group)
         mesh, faces = work.mesh, work.target.faces
         if mesh.uv is not None and not faces.all():
-            corner_face = np.repeat(np.arange(len(faces)), np.diff(mesh.face_start, append=len(mesh.corner_vertex)))
-            rest = mesh.uv[mesh.corner_triangles[~faces[corner_face[mesh.corner_triangles[:, 0]]]]]
-            if placing.says_where(rest):
-                yield obj.name, rest
-
-
-def report_overlaps(works, all_works):
-    """Name the islands that lie on others now and did not before."""
-    names = [work.outcome.label for work in works]
-    now = [(work.uv / work.aspect)[work.triangles] for work in works]
-    before = [work.old_triangles for work in works]
-    before = [old if old is None else old / work.aspect for old, work in zip(before, works, strict=True)]
-    for obj, rest in _rests(all_works):
-        names.append(f"faces of {obj} that were not unwrapped")
-        now.append(rest)
-        before.append(rest)
-    for i, j in overlapping(now):
-        if before[i] is None or before[j] is None or not overlap(before[i], before[j]):
-            works[i].outcome.overlaps += (names[j],)
-            if j < len(works):
-                works[j].outcome.overlaps += (names[i],)
+            face = mesh.corner_faces[mesh.corner_triangles[:, 0]]
+            for image, shown in mesh.faces_by_image():
+                rest = mesh.uv[mesh.corner_triangles[(shown & ~faces)[face]]]
+                if placing.says_where(rest):
+                    yield obj, rest, image

@@ -25,11 +25,30 @@ class MeshArrays:
     uv: np.ndarray | None  # (c, 2) float64
     pinned: np.ndarray  # (c,) bool
     aspect: np.ndarray  # (f,) width by height of the image on each face
+    slot: np.ndarray  # (f,) the number of each face's material among the images
+    images: tuple[str, ...]  # what each of the materials shows, the same for what shares its UVs
 
     @cached_property
     def one_aspect(self):
         """That of all faces, None if they differ."""
         return self.aspect[0] if len(self.aspect) and (self.aspect == self.aspect[0]).all() else None
+
+    @cached_property
+    def corner_faces(self):
+        """(c,) the face of each corner."""
+        return np.repeat(np.arange(len(self.face_start)), np.diff(self.face_start, append=len(self.corner_vertex)))
+
+    def image_of(self, faces):
+        """The image that most of the faces show."""
+        if len(set(self.images)) == 1:
+            return self.images[0]
+        slots, counts = np.unique(self.slot[faces], return_counts=True)
+        return self.images[slots[np.argmax(counts)]]
+
+    def faces_by_image(self):
+        """Yield each image, and which faces show it, (f,) bool."""
+        for image in sorted(set(self.images)):
+            yield image, np.array([each == image for each in self.images])[self.slot]
 
 
 def read(obj, options=None):
@@ -66,6 +85,7 @@ def _read(obj, mesh, uv_name, options):
         pins = mesh.attributes.get(f".pn.{uv_name}")  # in Blender 4, asking the layer for its pins would make this
         if pins is not None:
             pinned = _get(pins.data, "value", bool)
+    slot, images, aspects = _images(obj, mesh)
     return MeshArrays(
         vertices=vertices.astype(np.float64) @ shown.T,
         up=shown[:, 2] / (np.linalg.norm(shown[:, 2]) or 1.0),
@@ -76,7 +96,9 @@ def _read(obj, mesh, uv_name, options):
         corner_triangles=_corner_triangles(mesh),
         uv=uv,
         pinned=pinned,
-        aspect=_aspects(obj, mesh) if options.correct_aspect else np.ones(len(mesh.polygons)),
+        aspect=aspects[slot] if options.correct_aspect else np.ones(len(mesh.polygons)),
+        slot=slot,
+        images=images,
     )
 
 
@@ -99,20 +121,40 @@ def _corner_triangles(mesh):
     return _get(mesh.loop_triangles, "loops", np.int32, 3)
 
 
-def _aspects(obj, mesh):
-    slots = np.array([_aspect(slot.material) for slot in obj.material_slots] or [1.0])
-    if (slots == slots[0]).all():
-        return np.full(len(mesh.polygons), slots[0])
-    return slots[np.minimum(_get(mesh.polygons, "material_index", np.int32), len(slots) - 1)]
+def _images(obj, mesh):
+    """The number of each face's material, (f,), what these materials show, and the aspects of that, (m,).
+
+    What has the same image shares its UVs; without an image, what has the same material, which may get one later; and
+    without a material, what is one object.
+    """
+    materials = [slot.material for slot in obj.material_slots] or [None]
+    images = [_image(material) for material in materials]
+    names = tuple(
+        f"image {image.name_full}"
+        if image
+        else f"material {material.name_full}"
+        if material
+        else f"object {obj.name_full}"
+        for image, material in zip(images, materials, strict=True)
+    )
+    if len(materials) == 1:
+        slot = np.zeros(len(mesh.polygons), dtype=np.int32)
+    else:
+        slot = np.minimum(_get(mesh.polygons, "material_index", np.int32), len(materials) - 1)
+    return slot, names, np.array([_aspect(image) for image in images])
 
 
-def _aspect(material):
-    """Of the image that Blender shows for the material in the viewport."""
+def _image(material):
+    """The image that Blender shows for the material in the viewport, None if there is none."""
     nodes = material.node_tree.nodes if material and material.use_nodes and material.node_tree else ()
-    images = [node for node in nodes if node.type == 'TEX_IMAGE' and node.image and min(node.image.size) > 0]
-    if not images:
+    nodes = [node for node in nodes if node.type == 'TEX_IMAGE' and node.image and min(node.image.size) > 0]
+    return next((node for node in nodes if node.show_texture), nodes[0]).image if nodes else None
+
+
+def _aspect(image):
+    """Width by height of the image as it is shown, 1 for none."""
+    if image is None:
         return 1.0
-    image = next((node for node in images if node.show_texture), images[0]).image
     (width, height), (pixel_width, pixel_height) = image.size, image.display_aspect
     return (width * pixel_width) / (height * pixel_height)
 

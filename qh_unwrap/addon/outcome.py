@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What became of the islands, for the report line, the panel and the command line; needs no Blender."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +23,9 @@ class Outcome:
     iterations: int = 0
     converged: bool = False
     injective: bool = False  # certified: it covers no place twice
-    overlaps: tuple[str, ...] = ()  # what it lies on since it was unwrapped
+    overlaps: tuple[str, ...] = ()  # some of what it lies on since it was unwrapped
+    more_overlaps: int = 0  # others that it lies on as well; where there are many, not all are counted
+    packed: bool = False
     warnings: tuple[str, ...] = ()
     error: str = ""
 
@@ -32,26 +35,40 @@ class Outcome:
         return len(self.face_indices)
 
     @property
+    def name(self):
+        """Its name: "Cube", with a number if the mesh has others."""
+        return self.obj if self.alone else f"{self.obj}, island {self.number}"
+
+    @property
     def label(self):
-        """Its name: "Cube (6 faces)", with a number if the mesh has others."""
-        number = "" if self.alone else f", island {self.number}"
-        return f"{self.obj}{number} ({count(self.faces, 'face')})"
+        """Its name and size: "Cube (6 faces)"."""
+        return f"{self.name} ({count(self.faces, 'face')})"
 
     @property
     def overlaps_itself(self):
         """Or touches itself, though nothing is flipped."""
         return not (self.error or self.injective or self.after.flips or self.after.collapsed)
 
-    def messages(self, known=()):
-        """Its warnings, and what it lies on, but for what is `known`."""
-        found = list(self.warnings)
-        if self.overlaps_itself:
-            found.append("it overlaps itself")
-        news = [name for name in self.overlaps if name not in known]
-        if news:
-            others = f" and {len(news) - 1} more" if news[1:] else ""
-            found.append(f"it lies on {news[0]}{others} now: pack them together")
-        return found
+    @property
+    def overlap(self):
+        """What it lies on, and the cure; nothing if it lies on nothing."""
+        if not self.overlaps:
+            return ""
+        more = len(self.overlaps) - 1 + self.more_overlaps
+        return f"it lies on {self.overlaps[0]}{f' and {more} more' if more else ''} now: {self.overlap_cure}"
+
+    @property
+    def overlap_cure(self):
+        return "move it to a free place" if self.packed else "pack them together"
+
+    @property
+    def remarks(self):
+        """Its warnings, and whether it overlaps itself."""
+        return [*self.warnings, *(["it overlaps itself"] if self.overlaps_itself else [])]
+
+    def messages(self):
+        """All that there is to say about it, as sentences that begin with "it" or stand for themselves."""
+        return [*self.remarks, *([self.overlap] if self.overlaps else [])]
 
     def sentence(self, text):
         """One of its messages with its name: "Cube (6 faces) is closed: ..." of "it is closed: ..."."""
@@ -74,6 +91,7 @@ class Outcome:
             converged=self.converged,
             injective=self.injective,
             overlaps=list(self.overlaps),
+            more_overlaps=self.more_overlaps,
             warnings=self.messages(),
         )
 
@@ -85,17 +103,44 @@ def last_report():
     """What became of every island of the latest run, in Blender or by the command line: a list of dictionaries.
 
     Each has `object`, `island` (its number), `faces` (how many), `face_indices` and either `error` or `before`,
-    `after`, `iterations`, `converged`, `injective`, `overlaps` and `warnings`, as in the command line's JSON.
+    `after`, `iterations`, `converged`, `injective`, `overlaps` (some of what it lies on now), `more_overlaps` (how many
+    more were found) and `warnings`, as in the command line's JSON.
     """
     return [outcome.to_dict() | dict(face_indices=outcome.face_indices.tolist()) for outcome in latest]
 
 
 def sentences(outcomes):
-    """All that there is to say about what was unwrapped; of two that lie on each other the former says so."""
-    known = set()
-    for outcome in outcomes:
-        yield from map(outcome.sentence, outcome.messages(known))
-        known.add(outcome.label)
+    """All that there is to say about what was unwrapped, a line for each kind of message."""
+    done = [outcome for outcome in outcomes if not outcome.error]
+    yield from _lines((outcome, text) for outcome in done for text in outcome.remarks)
+    lying = [outcome for outcome in done if outcome.overlaps]
+    if not lying:
+        return
+    first, *others = lying
+    if [outcome.label for outcome in others] in ([], list(first.overlaps)):
+        yield first.sentence(first.overlap)
+    else:
+        where = f"first: {first.name} on {first.overlaps[0]}"
+        yield f"{len(lying)} islands lie on others now ({where}): {first.overlap_cure}"
+
+
+def error_sentences(outcomes):
+    """What kept islands from being unwrapped, a line for each kind of error."""
+    return list(_lines((outcome, outcome.error) for outcome in outcomes if outcome.error))
+
+
+def _lines(remarks):
+    """A line for each kind among pairs of outcomes and texts, which names the first of those that it is said of."""
+    kinds = {}
+    for outcome, text in remarks:
+        kinds.setdefault(_kind(text), []).append((outcome, text))
+    for (first, text), *others in kinds.values():
+        yield f"{len(others) + 1} islands (first: {first.name}): {text}" if others else first.sentence(text)
+
+
+def _kind(text):
+    """The same for texts that differ in their numbers alone: "1 face has ..." and "2 faces have ..."."""
+    return re.sub(r"\d\S*( \w+)?", "#", text).replace(" have ", " has ").replace(" are ", " is ")
 
 
 def summary(outcomes):
@@ -108,8 +153,8 @@ def summary(outcomes):
         if all(outcome.before for outcome in done):
             before = _shown(_mean(done, [outcome.before.l2_stretch for outcome in done]))
             stretch = f"{before} → {stretch}"
-        flips = sum(outcome.after.flips for outcome in done)
-        parts.append(f"{count(len(done), 'island')}, stretch {stretch}, {count(flips, 'flip')}")
+        flips, collapsed = (sum(getattr(outcome.after, name) for outcome in done) for name in ("flips", "collapsed"))
+        parts.append(f"{count(len(done), 'island')}, stretch {stretch}, {faults(flips, collapsed)}")
         overlapping = sum(bool(outcome.overlaps) for outcome in done)
         if overlapping:
             parts.append(f"{overlapping} on top of others")
@@ -121,6 +166,12 @@ def summary(outcomes):
         first = f"{failed[0].sentence(failed[0].error)}{more}"
         parts.append(f"{len(failed)} skipped: {first}" if done else first)
     return "; ".join(parts)
+
+
+def faults(flips, collapsed):
+    """How many triangles are flipped or collapsed: "no flips", "2 flips, 908 collapsed" or "908 collapsed"."""
+    parts = [count(flips, "flip")] if flips or not collapsed else []
+    return ", ".join([*parts, *([f"{collapsed} collapsed"] if collapsed else [])])
 
 
 def change(before, after, name):

@@ -16,7 +16,7 @@ from ..core.islands import attached, find_islands
 from ..core.pieces import joined, numbers
 from ..core.stepping import mapped
 from ..core.triangles import areas_in_space
-from . import layout, mesh_arrays, modes
+from . import layout, mesh_arrays, modes, stacking
 from .options import MeshOptions
 from .outcome import Outcome, count, latest
 from .selection import Target
@@ -34,23 +34,40 @@ def unwrap_targets(
     for target in targets:
         yield 0.0
         works += _works(target, settings, options)
-    yield from _unwrap(works)
-    yield 1.0
-    outcomes = [work.outcome for work in works]
-    if not all(mesh_arrays.is_as_read(work.target.obj, work.mesh) for work in works):
-        for outcome in outcomes:
-            outcome.error = "a mesh was changed meanwhile: unwrap again"
-    else:
-        layout.place([work for work in works if work.uv is not None], works, options, context)
-        placed = [work for work in works if work.uv is not None]
-        if placed:
-            if options.placement != 'UNIT':
-                layout.report_overlaps(placed, works)
+    yield from mapped(lambda share: _UNWRAPPING * share, _unwrap(works))
+    if _are_as_read(works):
+        placed = yield from _placed(works, options, context)
+        yield 1.0
+        if placed and _are_as_read(works):
             with modes.in_object_mode(context):
                 for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
                     _write(obj, list(group))
+    outcomes = [work.outcome for work in works]
     latest[:] = outcomes
     return outcomes
+
+
+_UNWRAPPING = 0.9  # of all the work, by and large; the rest is to see what lies on what
+
+
+def _are_as_read(works):
+    """Whether all meshes are as they were read; if not, no island is unwrapped, and its outcome says why."""
+    if all(mesh_arrays.is_as_read(work.target.obj, work.mesh) for work in works):
+        return True
+    for work in works:
+        work.outcome.error = "a mesh was changed meanwhile: unwrap again"
+    return False
+
+
+def _placed(works, options, context):
+    """Put the islands where they belong, and see what they lie on there; yields the share that is done, returns those
+    that have UVs now."""
+    layout.place([work for work in works if work.uv is not None], works, options, context)
+    placed = [work for work in works if work.uv is not None]
+    if placed and options.placement != 'UNIT':
+        rest = 1 - _UNWRAPPING
+        yield from mapped(lambda share: _UNWRAPPING + rest * share, stacking.report_overlaps(placed, works))
+    return placed
 
 
 def _works(target, settings, options):
@@ -62,7 +79,8 @@ def _works(target, settings, options):
         hanging = attached(*topology, mesh.uv)
     islands = find_islands(*topology, mesh.corner_triangles)
     for number, island in enumerate(islands, start=1):
-        outcome = Outcome(obj.name, number, island.faces, alone=len(islands) == 1)
+        packed = options.placement == 'PACK'
+        outcome = Outcome(obj.name, number, island.faces, alone=len(islands) == 1, packed=packed)
         yield Work(target, mesh, island, outcome, settings, hanging)
 
 

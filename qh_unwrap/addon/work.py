@@ -38,6 +38,11 @@ class Work:
         return np.array([values[np.argmax(counts)], 1.0])
 
     @cached_property
+    def image(self):
+        """What most of its faces show: what shows the same shares the UVs."""
+        return self.mesh.image_of(self.island.faces)
+
+    @cached_property
     def old_uv(self):
         """(n, 2), None if there is no map or nothing in it; where the map is cut, of one of the corners."""
         if self.mesh.uv is None or self.uv_fault:

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which islands lie on others now and did not before: quickly said of thousands, and named of a few."""
+
+from ..core.overlaps import new_overlaps
+from . import layout
+
+_NAMED = 5  # of those that an island lies on
+
+
+def report_overlaps(works, all_works):
+    """Put into the works' outcomes what they lie on now and did not lie on before.
+
+    A generator that yields the share that is done, from 0 to 1.  What shares no image does not overlap.
+    """
+    names = [work.outcome.label for work in works]
+    now = [(work.uv / work.aspect)[work.triangles] for work in works]
+    before = [work.old_triangles for work in works]
+    before = [old if old is None else old / work.aspect for old, work in zip(before, works, strict=True)]
+    images = [work.image for work in works]
+    for obj, rest, image in layout.left_alone(all_works):
+        names.append(f"faces of {obj.name} that were not unwrapped")
+        now.append(rest)
+        before.append(rest)
+        images.append(image)
+    numbers = {image: number for number, image in enumerate(dict.fromkeys(images))}
+    found = yield from new_overlaps(now, before, [numbers[image] for image in images])
+    for work, others in zip(works, found, strict=False):
+        work.outcome.overlaps = tuple(names[other] for other in others[:_NAMED])
+        work.outcome.more_overlaps = len(others[_NAMED:])
