@@ -117,7 +117,9 @@ def _run(args):
     targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
     with files.quiet():
         outcomes = finished(unwrapping.unwrap_targets(targets, settings, options, bpy.context))
-    _print_table(outcomes, outcome.sentences(outcomes), outcome.change)
+    if not outcomes:
+        raise _FileError(f"{', '.join(obj.name for obj in objects)}: there are no visible faces")
+    _print_table(outcomes, outcome)
 
     done = [outcome for outcome in outcomes if not outcome.error]
     if args.output and done:
@@ -178,18 +180,18 @@ def _chosen(objects, args):
     return [obj for obj in objects if not args.object or obj.name in args.object]
 
 
-def _print_table(outcomes, sentences, change):
+def _print_table(outcomes, words):
+    """Print a row for each island, a line for each kind of message, and to stderr one for each kind of error."""
     head = ("island", "faces", "stretch", "sym. Dirichlet", "angle", "area", "flips", "iterations")
-    rows = [_row(outcome, change) for outcome in outcomes if not outcome.error]
+    rows = [_row(outcome, words.change) for outcome in outcomes if not outcome.error]
     widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
     for row in (head, *rows) if rows else ():
         first, *others = (text.rjust(width) for text, width in zip(row, widths, strict=True))
         print("  ".join((first.strip().ljust(widths[0]), *others)))
-    for sentence in sentences:
+    for sentence in words.sentences(outcomes):
         print(sentence)
-    for outcome in outcomes:
-        if outcome.error:
-            print(outcome.sentence(outcome.error), file=sys.stderr)
+    for sentence in words.error_sentences(outcomes):
+        print(sentence, file=sys.stderr)
 
 
 def _row(outcome, change):

@@ -5,11 +5,11 @@ import bpy
 
 from ..core.errors import SettingsError
 from . import properties, selection
-from .outcome import latest, sentences, summary
+from .outcome import error_sentences, latest, sentences, summary
 from .running import InSteps
 from .unwrapping import unwrap_targets
 
-last_outcomes = latest  # for the panels
+last_outcomes = latest
 
 
 class QH_OT_unwrap(InSteps, properties.OperatorProperties, bpy.types.Operator):
@@ -50,7 +50,8 @@ class QH_OT_unwrap(InSteps, properties.OperatorProperties, bpy.types.Operator):
         return unwrap_targets(targets, settings, options, context)
 
     def finish(self, outcomes):
-        for sentence in sentences(outcomes):
+        errors = error_sentences(outcomes)
+        for sentence in (*(errors if len(errors) > 1 else ()), *sentences(outcomes)):
             self.report({'INFO'}, sentence)
         failed = sum(bool(outcome.error) for outcome in outcomes)
         if failed == len(outcomes):

@@ -79,6 +79,13 @@ class Outcome:
         """Unwrapped, with nothing flipped, collapsed or on top of anything."""
         return not self.error and self.injective and not self.overlaps
 
+    @property
+    def rank(self):
+        """How much it needs a look, the smaller the more: failed, flipped or collapsed, on top of something, clean."""
+        if self.error:
+            return 0
+        return 1 if self.after.flips or self.after.collapsed else 3 if self.is_clean else 2
+
     def to_dict(self):
         """JSON-ready."""
         values = dict(object=self.obj, island=self.number, faces=self.faces)

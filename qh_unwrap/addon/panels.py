@@ -5,8 +5,9 @@ import textwrap
 
 import bpy
 
-from . import operators, properties
-from .outcome import change, count
+from . import properties
+from .last_run import last_run
+from .outcome import change, faults
 
 
 def draw_menu(menu, _context):
@@ -34,32 +35,42 @@ class _ReportPanel:
 
     @classmethod
     def poll(cls, _context):
-        return bool(operators.last_outcomes)
+        return bool(last_run.outcomes)
 
     def draw(self, _context):
-        outcomes = operators.last_outcomes
-        for outcome in outcomes[:_SHOWN]:
-            column = self.layout.column(align=True)
-            if outcome.error:
-                column.label(text=outcome.label, icon='ERROR')
-                for text in textwrap.wrap(outcome.error, _WIDTH):
-                    column.label(text=text, icon='BLANK1')
-                continue
-            column.label(text=outcome.label, icon='CHECKMARK' if outcome.is_clean else 'ERROR')
-            for text in _lines(outcome):
-                column.label(text=text, icon='BLANK1')
-        if len(outcomes) > _SHOWN:
-            self.layout.label(text=f"and {len(outcomes) - _SHOWN} more")
+        self.layout.operator("uv.qh_unwrap_copy_report", icon='COPYDOWN')
+        for icon, lines in (('ERROR', last_run.errors), ('INFO', last_run.lines)):
+            for line in lines:
+                _draw_text(self.layout.column(align=True), line, icon)
+        for outcome in last_run.ordered[:_SHOWN]:
+            _draw_outcome(self.layout.column(align=True), outcome)
+        if len(last_run.ordered) > _SHOWN:
+            self.layout.label(text=f"and {len(last_run.ordered) - _SHOWN} more")
 
 
 _SHOWN = 12  # islands
 _WIDTH = 32  # characters
 
 
-def _lines(outcome):
-    yield f"Stretch {change(outcome.before, outcome.after, 'l2_stretch')}, {count(outcome.after.flips, 'flip')}"
-    for warning in outcome.messages():
-        yield from textwrap.wrap(warning, _WIDTH)
+def _draw_text(column, text, icon):
+    for line in textwrap.wrap(text, _WIDTH):
+        column.label(text=line, icon=icon)
+        icon = 'BLANK1'
+
+
+def _draw_outcome(column, outcome):
+    """Its name, with a button that selects its faces if it needs a look, and its numbers if there are any."""
+    row = column.row()
+    row.label(text=outcome.label, icon='CHECKMARK' if outcome.is_clean else 'ERROR')
+    if not outcome.is_clean:
+        button = row.operator("uv.qh_unwrap_select", text="", icon='RESTRICT_SELECT_OFF')
+        button.object, button.island = outcome.obj, outcome.number
+    if outcome.error and len(last_run.errors) > 1:  # which of them
+        _draw_text(column, outcome.error, 'BLANK1')
+    if not outcome.error:
+        stretch = change(outcome.before, outcome.after, "l2_stretch")
+        faulty = faults(outcome.after.flips, outcome.after.collapsed)
+        column.label(text=f"Stretch {stretch}, {faulty}", icon='BLANK1')
 
 
 class QH_PT_uv_editor(_Panel, bpy.types.Panel):

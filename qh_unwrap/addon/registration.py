@@ -3,11 +3,14 @@
 
 import bpy
 
-from . import operators, panels, properties
+from . import operators, panels, properties, report_operators
+from .last_run import last_run
 
 _CLASSES = (
     properties.QHUnwrapSceneSettings,
     operators.QH_OT_unwrap,
+    report_operators.QH_OT_select,
+    report_operators.QH_OT_copy_report,
     panels.QH_PT_uv_editor,
     panels.QH_PT_view_3d,
     panels.QH_PT_uv_editor_report,
@@ -28,4 +31,4 @@ def unregister():
     del bpy.types.Scene.qh_unwrap
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)
-    operators.last_outcomes.clear()
+    last_run.forget()

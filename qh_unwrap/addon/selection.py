@@ -41,10 +41,25 @@ def targets(context):
 
 def nothing_selected(context):
     """Why there is nothing to unwrap, and what to do."""
+    if context.mode == 'OBJECT':
+        return _nothing_visible(mesh_objects(context))
     by_uvs = not context.scene.tool_settings.use_uv_select_sync
-    if context.mode == 'EDIT_MESH' and _in_uv_editor(context) and by_uvs:
+    if _in_uv_editor(context) and by_uvs:
         return "No faces are selected: press A in the UV Editor, or turn on UV Sync Selection"
     return "No faces are selected"
+
+
+def _nothing_visible(objects):
+    """The same of meshes without visible faces."""
+    with_faces = [obj for obj in objects if obj.data.polygons]
+    if not with_faces:
+        return f"{_named(objects)} no faces: select a mesh that has some"
+    return f"{_named(with_faces)} no visible faces: press Alt H in Edit Mode to show them"
+
+
+def _named(objects):
+    names = objects[0].name if len(objects) == 1 else f"{objects[0].name} and {len(objects) - 1} more"
+    return f"{names} {'has' if len(objects) == 1 else 'have'}"
 
 
 def visible_faces(mesh):

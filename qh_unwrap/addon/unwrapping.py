@@ -17,8 +17,9 @@ from ..core.pieces import joined, numbers
 from ..core.stepping import mapped
 from ..core.triangles import areas_in_space
 from . import layout, mesh_arrays, modes, stacking
+from .last_run import last_run
 from .options import MeshOptions
-from .outcome import Outcome, count, latest
+from .outcome import Outcome, count
 from .selection import Target
 from .work import Work
 
@@ -43,7 +44,7 @@ def unwrap_targets(
                 for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
                     _write(obj, list(group))
     outcomes = [work.outcome for work in works]
-    latest[:] = outcomes
+    last_run.remember(outcomes, settings, options)
     return outcomes
 
 
@@ -115,15 +116,22 @@ def _shape(work):
         elif settings.boundary != 'KEEP':
             settings = dataclasses.replace(settings, boundary='KEEP')
             work.outcome.warnings += ("its outline is kept, since faces that are not selected hang on it",)
-    if work.uv_fault and (settings.boundary == 'KEEP' or settings.initial == 'CURRENT'):
-        raise UVError(f"{work.uv_fault}: unwrap it once without keeping or starting from them")
     work.in_frame = settings.boundary == 'KEEP' or (settings.boundary == 'FREE' and bool(pinned.any()))
+    if work.uv_fault and (work.in_frame or settings.initial == 'CURRENT'):
+        raise UVError(f"{work.uv_fault}: {_without_uvs(settings)}")
     if uv is not None and work.is_cut:
         if work.in_frame or settings.initial == 'CURRENT':
             text = "its UVs are cut where there is no seam: mark the cuts with UV > Seams from Islands"
             raise UVError(text + (_HANGS if work.is_attached else ""))
         uv = None
     return settings, Shape(work.vertices, work.triangles, uv, pinned if pinned.any() else None)
+
+
+def _without_uvs(settings):
+    """What to do where UVs are needed and those that there are mean nothing."""
+    if settings.boundary == 'KEEP':
+        return "unwrap it with another boundary than Keep first"
+    return "choose another start than Current UVs" if settings.initial == 'CURRENT' else "unpin it, and unwrap it first"
 
 
 _HANGS = " (faces that are not selected hang on it: or select all of its island)"

@@ -54,8 +54,8 @@ class Work:
         """Why the map has no UVs for it though there is a map, or an empty text."""
         corner_uv = np.empty((0, 2)) if self.mesh.uv is None else self.mesh.uv[self._corners]
         if not np.isfinite(corner_uv).all():
-            return "its UVs are no numbers (NaN or infinite)"
-        return "its UVs all lie in one point" if len(corner_uv) and not np.ptp(corner_uv, axis=0).any() else ""
+            return "some of its UVs are no numbers"
+        return "all its UVs are in one place" if len(corner_uv) and not np.ptp(corner_uv, axis=0).any() else ""
 
     @property
     def _corners(self):

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What there is to show of the latest run, worked out once, and the text that *Copy Report* copies."""
+
+import dataclasses
+import platform
+
+import numpy as np
+import scipy
+
+from .. import __version__
+from .outcome import error_sentences, latest, sentences, summary
+
+
+class LastRun:
+    """The latest run: its outcomes, those first that need a look, and what there is to say about them."""
+
+    def __init__(self):
+        self.outcomes = latest
+        self.ordered, self.errors, self.lines, self.summary, self.settings = [], [], [], "", {}
+
+    def remember(self, outcomes, settings, options):
+        self.outcomes[:] = outcomes
+        self.ordered = sorted(outcomes, key=lambda outcome: outcome.rank)
+        self.errors, self.lines, self.summary = error_sentences(outcomes), list(sentences(outcomes)), summary(outcomes)
+        self.settings = dataclasses.asdict(settings) | dataclasses.asdict(options)
+
+    def forget(self):
+        self.outcomes.clear()
+        self.__init__()
+
+    def find(self, obj, number):
+        """The outcome of an island, given by its object's name and its number, None if there is none."""
+        return next((each for each in self.outcomes if (each.obj, each.number) == (obj, number)), None)
+
+    def text(self, blender):
+        """All of it for a report of a fault, with the versions of what took part and the settings."""
+        versions = {
+            "QH Unwrap": __version__,
+            "Blender": blender,
+            "Python": platform.python_version(),
+            "NumPy": np.__version__,
+            "SciPy": scipy.__version__,
+        }
+        lines = [
+            f"{', '.join(f'{name} {version}' for name, version in versions.items())}, {platform.platform()}",
+            f"Settings: {', '.join(f'{name}={value}' for name, value in self.settings.items())}",
+            *self.errors,
+            *self.lines,
+            self.summary,
+        ]
+        return "\n".join(lines) + "\n"
+
+
+last_run = LastRun()
