@@ -75,6 +75,6 @@ def left_alone(works):
         if mesh.uv is not None and not faces.all():
             face = mesh.corner_faces[mesh.corner_triangles[:, 0]]
             for image, shown in mesh.faces_by_image():
-                rest = mesh.uv[mesh.corner_triangles[(shown & ~faces)[face]]]
+                rest = mesh.uv[mesh.corner_triangles[(shown & ~faces & ~mesh.fresh)[face]]]
                 if placing.says_where(rest):
                     yield obj, rest, image

@@ -38,6 +38,23 @@ class MeshArrays:
         """(c,) the face of each corner."""
         return np.repeat(np.arange(len(self.face_start)), np.diff(self.face_start, append=len(self.corner_vertex)))
 
+    @cached_property
+    def fresh(self):
+        """(f,) bool, which faces have the UVs of a new map, where every face fills the square: they say nothing.
+
+        One face alone may lie so on purpose; where several do, none counts.
+        """
+        if self.uv is None or not len(self.face_start):
+            return np.zeros(len(self.face_start), dtype=bool)
+        size = np.diff(self.face_start, append=len(self.corner_vertex))[self.corner_faces]
+        place = np.arange(len(self.corner_vertex)) - self.face_start[self.corner_faces]
+        angle = 2 * np.pi * place / size
+        square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])[place % 4]
+        expected = np.where(size[:, None] <= 4, square, 0.5 + 0.5 * np.column_stack([np.sin(angle), np.cos(angle)]))
+        alike = (np.abs(self.uv - expected) < 1e-6).all(axis=1)
+        found = np.logical_and.reduceat(alike, self.face_start)
+        return found & (found.sum() > 1)
+
     def image_of(self, faces):
         """The image that most of the faces show."""
         if len(set(self.images)) == 1:

@@ -117,10 +117,13 @@ def _shape(work):
             settings = dataclasses.replace(settings, boundary='KEEP')
             work.outcome.warnings += ("its outline is kept, since faces that are not selected hang on it",)
     work.in_frame = settings.boundary == 'KEEP' or (settings.boundary == 'FREE' and bool(pinned.any()))
-    if work.uv_fault and (work.in_frame or settings.initial == 'CURRENT'):
+    uses_uv = work.in_frame or settings.initial == 'CURRENT'
+    if work.uv_fault and uses_uv:
         raise UVError(f"{work.uv_fault}: {_without_uvs(settings)}")
+    if uv is not None and work.is_fresh and not uses_uv:
+        uv = None
     if uv is not None and work.is_cut:
-        if work.in_frame or settings.initial == 'CURRENT':
+        if uses_uv:
             text = "its UVs are cut where there is no seam: mark the cuts with UV > Seams from Islands"
             raise UVError(text + (_HANGS if work.is_attached else ""))
         uv = None

@@ -79,7 +79,7 @@ class Work:
     @cached_property
     def old_triangles(self):
         """The triangles' old UVs (t, 3, 2), None if they do not say where the island belongs."""
-        if self.old_uv is None:
+        if self.old_uv is None or self.is_fresh:
             return None
         old = self.mesh.uv[self.island.triangle_corners] * self.aspect
         return old if placing.says_where(old) else None
@@ -119,6 +119,11 @@ class Work:
         old, corner_uv = self.old_uv, self.mesh.uv[self._corners] * self.aspect
         tolerance = 1e-5 * np.ptp(old, axis=0).max() + 4 * np.finfo(np.float32).eps * np.abs(old).max()
         return np.abs(old[self._corner_vertex] - corner_uv).max() > tolerance
+
+    @cached_property
+    def is_fresh(self):
+        """Whether its old UVs are those of a new map, which say nothing; pinned ones always do."""
+        return bool(self.mesh.fresh[self.island.faces].all()) and not self.pinned.any()
 
     @property
     def drawn(self):
