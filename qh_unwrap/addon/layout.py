@@ -29,12 +29,31 @@ def place(works, all_works, options, context):
             work.uv = uv
     if options.placement == 'PACK':
         _pack(works, options, True, context)
+        _make_way(works, all_works)
     elif new:
         _pack(new, options, False, context)
         tile = placing.free_tile(np.concatenate([np.empty((0, 2)), *_others(new, all_works)]))
         for work in new:
             if work.uv is not None:
                 work.uv = work.uv + (tile, 0) * work.aspect
+
+
+def _make_way(works, all_works):
+    """Move packed islands to a free tile if islands that are held lie where they were packed, on the same image.
+
+    Blender's packer can pack around pinned islands, but where these leave little room it shrinks the others to nothing.
+    """
+    held = {}
+    for work in all_works:
+        uv = work.uv if work.uv is not None else work.old_uv
+        if work.in_frame and uv is not None:
+            held.setdefault(work.image, []).append(uv / work.aspect)
+    tiles = {image: placing.free_tile(np.concatenate(uvs)) for image, uvs in held.items()}
+    for work in works:
+        tile = tiles.get(work.image, 0)
+        if tile and work.uv is not None:
+            work.uv = work.uv + (tile, 0) * work.aspect
+            work.outcome.warnings += ("it is packed beside the square, in which pinned islands lie",)
 
 
 def _pack(works, options, nested, context):

@@ -17,7 +17,7 @@ _PLACEMENT = (
         "PACK",
         "Pack",
         "All islands get the same texel density and are packed into the 0 to 1 square by Blender, which may take a"
-        " minute",
+        " minute; into a tile beside it if pinned islands lie there",
     ),
     Choice("UNIT", "Unit Square", "Each island fills the 0 to 1 square"),
 )

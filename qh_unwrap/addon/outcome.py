@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import Distortion
+from ..core.overlaps import ENOUGH
 
 
 @dataclass
@@ -25,7 +26,7 @@ class Outcome:
     injective: bool = False  # certified: it covers no place twice
     overlaps: tuple[str, ...] = ()  # some of what it lies on since it was unwrapped
     more_overlaps: int = 0  # others that it lies on as well; where there are many, not all are counted
-    packed: bool = False
+    overlap_cure: str = ""
     warnings: tuple[str, ...] = ()
     error: str = ""
 
@@ -55,11 +56,8 @@ class Outcome:
         if not self.overlaps:
             return ""
         more = len(self.overlaps) - 1 + self.more_overlaps
-        return f"it lies on {self.overlaps[0]}{f' and {more} more' if more else ''} now: {self.overlap_cure}"
-
-    @property
-    def overlap_cure(self):
-        return "move it to a free place" if self.packed else "pack them together"
+        least = "at least " if more + 1 >= ENOUGH else ""  # no more were looked for
+        return f"it lies on {self.overlaps[0]}{f' and {least}{more} more' if more else ''} now: {self.overlap_cure}"
 
     @property
     def remarks(self):

@@ -7,7 +7,7 @@ from . import layout
 _NAMED = 5  # of those that an island lies on
 
 
-def report_overlaps(works, all_works):
+def report_overlaps(works, all_works, options):
     """Put into the works' outcomes what they lie on now and did not lie on before.
 
     A generator that yields the share that is done, from 0 to 1.  What shares no image does not overlap.
@@ -18,12 +18,16 @@ def report_overlaps(works, all_works):
     before = [old if old is None else old / work.aspect for old, work in zip(before, works, strict=True)]
     images = [work.image for work in works]
     for obj, rest, image in layout.left_alone(all_works):
-        names.append(f"faces of {obj.name} that were not unwrapped")
+        names.append(f"other faces of {obj.name}")
         now.append(rest)
         before.append(rest)
         images.append(image)
     numbers = {image: number for number, image in enumerate(dict.fromkeys(images))}
     found = yield from new_overlaps(now, before, [numbers[image] for image in images])
     for work, others in zip(works, found, strict=False):
-        work.outcome.overlaps = tuple(names[other] for other in others[:_NAMED])
-        work.outcome.more_overlaps = len(others[_NAMED:])
+        outcome = work.outcome
+        outcome.overlaps = tuple(names[other] for other in others[:_NAMED])
+        outcome.more_overlaps = len(others[_NAMED:])
+        # Packing moves only what is unwrapped, and does not help again.
+        packing_helps = options.placement != 'PACK' and others and others[0] < len(works)
+        outcome.overlap_cure = "pack them together" if packing_helps else "move it to a free place"

@@ -67,7 +67,7 @@ def _placed(works, options, context):
     placed = [work for work in works if work.uv is not None]
     if placed and options.placement != 'UNIT':
         rest = 1 - _UNWRAPPING
-        yield from mapped(lambda share: _UNWRAPPING + rest * share, stacking.report_overlaps(placed, works))
+        yield from mapped(lambda share: _UNWRAPPING + rest * share, stacking.report_overlaps(placed, works, options))
     return placed
 
 
@@ -80,8 +80,7 @@ def _works(target, settings, options):
         hanging = attached(*topology, mesh.uv)
     islands = find_islands(*topology, mesh.corner_triangles)
     for number, island in enumerate(islands, start=1):
-        packed = options.placement == 'PACK'
-        outcome = Outcome(obj.name, number, island.faces, alone=len(islands) == 1, packed=packed)
+        outcome = Outcome(obj.name, number, island.faces, alone=len(islands) == 1)
         yield Work(target, mesh, island, outcome, settings, hanging)
 
 

@@ -11,7 +11,7 @@ from scenes import add_grid, mesh_object, uvs
 from qh_unwrap import last_report
 from qh_unwrap.addon import operators, selection, stacking, unwrapping
 from qh_unwrap.addon.options import MeshOptions
-from qh_unwrap.addon.outcome import sentences
+from qh_unwrap.addon.outcome import Outcome, sentences
 from qh_unwrap.core import Settings
 from qh_unwrap.core.layouts import Layout
 from qh_unwrap.core.overlaps import ENOUGH, new_overlaps, overlap, overlapping
@@ -177,6 +177,11 @@ def test_many_islands_that_lie_on_others_are_told_in_one_line(monkeypatch):
     inner = last_report()[7]
     assert len(inner["overlaps"]) == 2 and inner["more_overlaps"] == 2
     assert f"it lies on {inner['overlaps'][0]} and 3 more now: pack them together" in inner["warnings"]
+
+
+def test_not_all_are_counted():
+    outcome = Outcome("Cube", 1, np.arange(4), overlaps=("A", "B"), more_overlaps=ENOUGH - 2, overlap_cure="pack")
+    assert outcome.overlap == f"it lies on A and at least {ENOUGH - 1} more now: pack"
 
 
 def paint(obj, name, with_image):
