@@ -53,7 +53,8 @@ _UNWRAPPING = 0.9  # of all the work, by and large; the rest is to see what lies
 
 def _are_as_read(works):
     """Whether all meshes are as they were read; if not, no island is unwrapped, and its outcome says why."""
-    if all(mesh_arrays.is_as_read(work.target.obj, work.mesh) for work in works):
+    meshes = {id(work.mesh): work for work in works}.values()  # once each
+    if all(mesh_arrays.is_as_read(work.target.obj, work.mesh) for work in meshes):
         return True
     for work in works:
         work.outcome.error = "a mesh was changed meanwhile: unwrap again"

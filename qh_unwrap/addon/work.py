@@ -165,5 +165,7 @@ class Work:
 
     def _vertices_of(self, corners):
         chosen = np.zeros(len(self.island.vertices), dtype=bool)
-        chosen[self.island.corner_vertex[corners[self.island.corners]]] = True
+        its = corners[self.island.corners]
+        if its.any():
+            chosen[self.island.corner_vertex[its]] = True
         return chosen

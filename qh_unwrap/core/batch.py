@@ -63,7 +63,7 @@ class Batch:
 
     def rows_of(self, k: int) -> slice:
         """The vertices of piece k."""
-        return slice(*np.append(self.surface.vertex_starts, len(self.uv))[k : k + 2])
+        return slice(*self.surface.vertex_ends[k : k + 2])
 
     def of(self, pieces: np.ndarray) -> Batch:
         """The chosen pieces, (p,) bool, alone."""

@@ -192,6 +192,21 @@ class Surface(Chart):
         return self.loop_piece[self.piece_count :]
 
     @cached_property
+    def vertex_ends(self) -> list[int]:
+        """(p + 1), where the vertices of each piece begin, and where the last one ends."""
+        return [*self.vertex_starts.tolist(), len(self.vertices)]
+
+    @cached_property
+    def outline_lengths(self) -> np.ndarray:
+        """(p,), of the pieces' outlines, in the scale of `vertices`."""
+        loop = np.concatenate(self.outlines)
+        start = np.cumsum([0, *(len(each) for each in self.outlines)])
+        following = np.roll(loop, -1)
+        following[start[1:] - 1] = loop[start[:-1]]
+        length = np.linalg.norm(self.vertices[following] - self.vertices[loop], axis=1)
+        return np.add.reduceat(length, start[:-1])
+
+    @cached_property
     def loops_of(self) -> list[list[np.ndarray]]:
         """The loops of every piece, its outline first."""
         result: list[list[np.ndarray]] = [[] for _ in range(self.piece_count)]
@@ -257,7 +272,7 @@ class Surface(Chart):
         """The surface of piece k alone; takes no longer for the others."""
         if self.piece_count == 1:
             return self
-        first, end = np.append(self.vertex_starts, len(self.vertices))[k : k + 2]
+        first, end = self.vertex_ends[k : k + 2]
         its = slice(*np.append(self.triangle_starts, len(self.triangles))[k : k + 2])
         edges = slice(*np.searchsorted(self.edges[:, 0], (first, end)))
         made = Surface.__new__(Surface)

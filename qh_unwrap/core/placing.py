@@ -17,7 +17,7 @@ def says_where(corners: np.ndarray) -> bool:
 
     They do if they have some area and are no pile of faces, as in a new UV map, where each face fills the square.
     """
-    if not np.isfinite(corners).all():
+    if not len(corners) or not np.isfinite(corners).all():
         return False
     area = np.abs(signed_areas(corners)).sum()
     extent = np.prod(np.ptp(corners.reshape(-1, 2), axis=0))

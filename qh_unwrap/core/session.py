@@ -10,10 +10,11 @@ import numpy as np
 from .air import Triangulator
 from .batch import Batched, checked_pins
 from .certificate import certified_pieces
-from .course import Course, Steps
+from .course import Course
 from .delaunay import triangulate as own_triangulate
 from .distortion import measure_pieces
 from .errors import PinError, UnwrapError, UVError
+from .improvement import Steps
 from .report import Report, Result, Shape, State, face_warnings
 from .settings import Settings
 
@@ -93,6 +94,7 @@ class Unwrapper:
             for each in (course.now, course.best):
                 each[its] = shown
             batch.uv[its], batch.has_uv[k], batch.mirror[k] = shown, True, 1
+        course.sure[k] = False
         batch.pinned[its] = pins
         batch.uv[its] = np.where(pins, uv * batch.mirror[k], course.best[its])
         self._go_on()
@@ -155,7 +157,12 @@ class Unwrapper:
         chosen = course.placed(course.best)
         before = measure_pieces(surface, batch.uv) if batch.has_uv.any() else [None] * surface.piece_count
         initial, after = measure_pieces(surface, course.start), measure_pieces(surface, chosen)
-        certified = certified_pieces(surface, chosen)
+        certified = course.sure.copy()
+        if not certified.all():
+            part, rows = surface, np.ones(len(chosen), bool)
+            if certified.any():
+                part, rows = surface.of(~certified), batch.rows(~certified)
+            certified[~certified] = certified_pieces(part, chosen[rows])
         flat = surface.sums(surface.degenerate.astype(int))
         for k, first in enumerate(surface.vertex_starts.tolist()):
             if k in course.faults:

@@ -10,7 +10,7 @@ import numpy as np
 
 from .boundary import held_outlines
 from .certificate import certified_pieces, wrong_pieces
-from .chart import Surface, perimeter
+from .chart import Surface
 from .domain import Fixed, Held
 from .energy import energies
 from .initial import conformal, fit, project, weighted_map
@@ -51,7 +51,7 @@ def best_start(surface: Surface, settings: Settings) -> tuple[np.ndarray, np.nda
     """
     start, least = np.zeros((len(surface.vertices), 2)), np.full(surface.piece_count, np.inf)
     certified, undecided = np.zeros(surface.piece_count, bool), np.ones(surface.piece_count, bool)
-    bulging = np.array([perimeter(surface.vertices[loop]) ** 2 < _BULGING * 4 * np.pi for loop in surface.outlines])
+    bulging = surface.outline_lengths**2 < _BULGING * 4 * np.pi
     untried = undecided.copy()
     for initial, enough in _CANDIDATES.items():
         trying = undecided & ~bulging if initial in ("PROJECTION", "CONFORMAL") else undecided

@@ -270,7 +270,7 @@ def checked_arrays(vertices: ArrayLike, triangles: ArrayLike) -> tuple[np.ndarra
         raise errors.ShapeError(f"vertices must have the shape (n, 3), not {vertices.shape}")
     if triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles):
         raise errors.ShapeError(f"triangles must have the shape (m, 3) with m > 0, not {triangles.shape}")
-    if not np.array_equal(indices, triangles):
+    if indices.dtype.kind not in "iu" and not np.array_equal(indices, triangles):
         raise errors.ShapeError("triangles must be whole numbers")
     if not np.isfinite(vertices).all():
         bad = ~np.isfinite(vertices).all(axis=1)

@@ -119,7 +119,7 @@ def _long_work(gui):
     """It shows how far it is; ESC, an error and another file end it, and leave nothing behind."""
     for area in (area for area in gui.window.screen.areas if area.type == 'VIEW_3D'):
         area.spaces.active.show_region_ui = False
-    _add(gui, _sheet(100), lambda one, other: False)
+    _add(gui, _sheet(180), lambda one, other: False)
     yield 2
     yield from _begin(gui)
     yield from _end(gui)
@@ -184,7 +184,7 @@ def _sheet(size):
     return add
 
 
-_BUTTONS = {"Unwrap": 43, "Mesh": 266, "Advanced": 291}  # pixels below the top of the sidebar
+_BUTTONS = {"Unwrap": 43, "Mesh": 289, "Advanced": 314}  # pixels below the top of the sidebar
 
 
 def _add(gui, add, is_seam):
