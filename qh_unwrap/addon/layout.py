@@ -32,10 +32,23 @@ def place(works, all_works, options, context):
         _make_way(works, all_works)
     elif new:
         _pack(new, options, False, context)
-        tile = placing.free_tile(np.concatenate([np.empty((0, 2)), *_others(new, all_works)]))
-        for work in new:
-            if work.uv is not None:
-                work.uv = work.uv + (tile, 0) * work.aspect
+        _move_beside(new, all_works)
+
+
+def pack_apart(works, options, context):
+    """Pack islands as they are beside everything else in their meshes."""
+    for work in works:
+        work.uv = work.old_uv
+    _pack(works, options, True, context)
+    _move_beside(works, works)
+
+
+def _move_beside(works, all_works):
+    """Move packed islands to the first tile from the square on that nothing else in their meshes lies in."""
+    tile = placing.free_tile(np.concatenate([np.empty((0, 2)), *_others(works, all_works)]))
+    for work in works:
+        if work.uv is not None:
+            work.uv = work.uv + (tile, 0) * work.aspect
 
 
 def _make_way(works, all_works):
@@ -57,19 +70,25 @@ def _make_way(works, all_works):
 
 
 def _pack(works, options, nested, context):
+    if not works:
+        return
     works = sorted(works, key=lambda work: work.aspect[0])
+    uvs, enlarged = placing.to_scale([(work.uv, work.vertices, work.triangles) for work in works])
+    islands = zip(works, uvs, strict=True)
     groups = {
-        aspect: [(work.vertices, work.triangles, work.uv) for work in group]
-        for aspect, group in itertools.groupby(works, key=lambda work: work.aspect[0])
+        aspect: [(uv, work.triangles) for work, uv in group]
+        for aspect, group in itertools.groupby(islands, key=lambda island: island[0].aspect[0])
     }
     try:
-        packed = packing.pack(groups, options, nested, context) if works else []
+        packed = packing.pack(groups, options, nested, context)
     except UnwrapError as error:
         packed = [None] * len(works)
         for work in works:
             work.outcome.error = str(error)
-    for work, uv in zip(works, packed, strict=True):
+    for work, uv, is_enlarged in zip(works, packed, enlarged.tolist(), strict=True):
         work.uv = uv
+        if is_enlarged and uv is not None:
+            work.outcome.warnings += ("beside the others it would vanish: packed larger than its share",)
 
 
 def _others(works, all_works):

@@ -13,33 +13,25 @@ _NAME = "QH Unwrap"
 def pack(groups, options, nested, context):
     """Lay islands out in the 0 to 1 square; returns their new UVs, one after another.
 
-    groups  {aspect: [(vertices, triangles, uv), ...]}, by the aspect of the image; UVs have its proportions
+    groups  {aspect: [(uv, triangles), ...]}, by the aspect of the image; UVs have its proportions and the same scale
 
-    They get the same texel density.  If `nested`, they fit into one another, which may take Blender a minute, and are
-    turned by right angles if the options say so; else their boxes lie side by side.  Blender packs what is selected in
-    Edit Mode, so this happens in a scene of its own, where no one's selection is disturbed.  Raises `UnwrapError` if
-    Blender does not.
+    If `nested`, they fit into one another, which may take Blender a minute, and are turned by right angles if the
+    options say so; else their boxes lie side by side.  Blender packs what is selected in Edit Mode, so this happens in
+    a scene of its own, where no one's selection is disturbed.  Raises `UnwrapError` if Blender does not.
     """
-    if not nested:
-        return _pack_boxes(groups, options, context)
-    return _pack(groups, options, nested, context)
+    return (_pack if nested else _pack_boxes)(groups, options, nested, context)
 
 
-def _pack_boxes(groups, options, context):
+def _pack_boxes(groups, options, nested, context):
     """The same for their boxes, which lie side by side: of each island Blender gets a rectangle."""
-    islands = [island for group in groups.values() for island in group]
-    uvs = [uv for _, _, uv in islands]
+    uvs = [uv for group in groups.values() for uv, _ in group]
     low, high = placing.boxes(uvs)
     high = np.maximum(high, low + 1e-6 * (high - low).max())
-    in_layout = placing.uv_areas([(uv, triangles) for _, triangles, uv in islands])
-    stretch = np.sqrt(placing.areas([island[:2] for island in islands]) / np.maximum(in_layout, 1e-300))
     corners = np.stack([low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])])
-    corners = corners.swapaxes(0, 1)
-    in_space = np.pad(corners * stretch[:, None, None], ((0, 0), (0, 0), (0, 1)))
     halves = np.array([[0, 1, 2], [0, 2, 3]])
-    rectangles = iter([(there, halves, here) for there, here in zip(in_space, corners, strict=True)])
-    boxes = {aspect: [next(rectangles) for _ in group] for aspect, group in groups.items()}
-    packed = np.array(_pack(boxes, options, False, context))
+    rectangles = iter(corners.swapaxes(0, 1))
+    boxes = {aspect: [(next(rectangles), halves) for _ in group] for aspect, group in groups.items()}
+    packed = np.array(_pack(boxes, options, nested, context))
     scale = np.ptp(packed, axis=1).max(axis=1) / (high - low).max(axis=1)
     return [(uv - old) * size + new for uv, old, size, new in zip(uvs, low, scale, packed[:, 0], strict=True)]
 
@@ -77,7 +69,6 @@ def _done(scene, meshes, options, nested, context):
         bpy.ops.ptcache.bake_all(bake=False)  # forgets an ESC pressed before, at which the packer silently stops
         bpy.ops.object.mode_set(mode='EDIT')
         bpy.ops.mesh.select_all(action='SELECT')
-        bpy.ops.uv.average_islands_scale()
         done = bpy.ops.uv.pack_islands(
             udim_source='CLOSEST_UDIM',
             rotate=nested and options.rotate,
@@ -95,13 +86,12 @@ def _done(scene, meshes, options, nested, context):
 
 def _mesh(aspect, islands, made):
     """One mesh of all the islands' triangles, with an image of that aspect."""
-    vertices, triangles, uvs = zip(*islands, strict=True)
-    vertices, triangles, _, _ = joined(vertices, triangles)
-    uv = np.concatenate(uvs) / (aspect, 1)
+    uv, triangles, _, _ = joined(*zip(*islands, strict=True))
+    uv = uv / (aspect, 1)
     mesh = bpy.data.meshes.new(_NAME)
     made.append(mesh)
-    mesh.vertices.add(len(vertices))
-    mesh.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
+    mesh.vertices.add(len(uv))
+    mesh.vertices.foreach_set("co", np.pad(uv, ((0, 0), (0, 1))).astype(np.float32).ravel())
     mesh.loops.add(triangles.size)
     mesh.loops.foreach_set("vertex_index", triangles.astype(np.int32).ravel())
     mesh.polygons.add(len(triangles))
@@ -132,4 +122,4 @@ def _uvs(mesh, aspect, islands):
     mesh.uv_layers[0].uv.foreach_get("vector", corners)
     uv = np.empty((len(mesh.vertices), 2))
     uv[vertex] = corners.reshape(-1, 2) * (aspect, 1)
-    return np.split(uv, starts_of([vertices for vertices, _, _ in islands])[1:])
+    return np.split(uv, starts_of([uv for uv, _ in islands])[1:])

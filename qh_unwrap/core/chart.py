@@ -353,22 +353,26 @@ def normalised_pieces(vertices: np.ndarray, topology: Topology) -> tuple[np.ndar
 def _sorted_loops(vertices, topology):
     """The outline of every piece, by pieces, then the holes, the widest first; and the piece of each.
 
-    The outline is the loop that reaches farthest from its middle: a ragged hole may well be longer.
+    The outline is the loop that reaches farthest from its middle: a ragged hole may well be longer.  Of several that
+    reach as far, it is the lowest, whatever the vertices' numbers are.
     """
     loops, piece = topology.loops, topology.loop_piece
     if len(loops) == topology.piece_count:  # one for each piece
         order = np.argsort(piece)
         return [loops[k] for k in order], piece[order]
-    width = [_width(vertices[loop]) for loop in loops]
-    order = np.array(sorted(range(len(loops)), key=lambda k: (piece[k], -width[k], loops[k][0])))
+    rank = [_rank(vertices[loop]) for loop in loops]
+    order = np.array(sorted(range(len(loops)), key=lambda k: (piece[k], *rank[k], loops[k][0])))
     is_outline = np.diff(piece[order], prepend=-1) > 0
     order = np.concatenate([order[is_outline], order[~is_outline]])
     return [loops[k] for k in order], piece[order]
 
 
-def _width(points):
-    # Rounded, so that of two equal rims the same one is the outline however the mesh is turned
-    return round(float(np.linalg.norm(points - points.mean(axis=0), axis=1).max()), 9)
+def _rank(points):
+    """Numbers by which loops with these points (n, 3) are sorted: how far they reach, then where their middle is."""
+    middle = points.mean(axis=0)
+    width = np.linalg.norm(points - middle, axis=1).max()
+    # Rounded, so that rounding errors do not tell equal ones apart
+    return -round(float(width), 9), *np.round(middle[::-1], 6).tolist()
 
 
 def edge_lengths(points: np.ndarray) -> np.ndarray:
@@ -378,4 +382,4 @@ def edge_lengths(points: np.ndarray) -> np.ndarray:
 
 def perimeter(points: np.ndarray) -> float:
     """Length of the closed polygon (n, d)."""
-    return edge_lengths(points).sum()
+    return float(edge_lengths(points).sum())

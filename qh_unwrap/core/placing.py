@@ -9,7 +9,9 @@ from scipy.spatial import ConvexHull, QhullError
 from .pieces import joined, numbers, starts_of
 from .triangles import areas_in_space, corners_of, signed_areas
 
+_FINEST = 1e-5  # side of a square with a triangle's area, by the layout's size, that can still be packed
 _STEEPEST_FLAT = 0.25  # slope, height by way along the island, up to which it lies flat and has no upper end
+_THROWN = 16  # times the median growth of triangles, from which on one has a vertex that was thrown elsewhere
 
 
 def says_where(corners: np.ndarray) -> bool:
@@ -27,15 +29,23 @@ def says_where(corners: np.ndarray) -> bool:
 def in_place(uv: np.ndarray, triangles: np.ndarray, old: np.ndarray) -> np.ndarray:
     """The UVs (n, 2) of triangles (t, 3) moved, rotated and scaled onto `old`, the triangles' old UVs (t, 3, 2).
 
-    They get the old centre and area, and the rotation that fits best in the sense of least squares.
+    They get the old centre and area, and the rotation that fits best in the sense of least squares.  Where the old map
+    has flips, triangles that are far too large in it, as around a vertex thrown elsewhere, do not count.
     """
     new = uv[triangles]
-    area, old_area = (np.abs(signed_areas(each)).sum() for each in (new, old))
+    signed = signed_areas(old)
+    if (signed * np.sign(signed.sum()) < 0).any():
+        growth = np.abs(signed) / np.maximum(np.abs(signed_areas(new)), np.finfo(float).tiny)
+        sound = growth <= _THROWN * np.median(growth)
+        if sound.any():
+            new, old = new[sound], old[sound]
+    area, old_area = (float(np.abs(signed_areas(each)).sum()) for each in (new, old))
     centre, old_centre = _centre(new), _centre(old)
     z, w = ((each.reshape(-1, 2) - middle) @ (1, 1j) for each, middle in ((new, centre), (old, old_centre)))
     rotation = np.vdot(z, w)
     rotation = rotation / abs(rotation) if abs(rotation) > 1e-9 * np.linalg.norm(z) * np.linalg.norm(w) else 1.0
-    moved = (uv - centre) @ (1, 1j) * rotation * np.sqrt(old_area / area)
+    size = np.sqrt(old_area / area) if area > 0 else 1.0
+    moved = (uv - centre) @ (1, 1j) * rotation * size
     return np.column_stack([moved.real, moved.imag]) + old_centre
 
 
@@ -118,6 +128,22 @@ def in_unit_square(uv: np.ndarray) -> np.ndarray:
     return (uv - low) * scale + (1 - size * scale) / 2
 
 
+def to_scale(
+    islands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """The UVs of islands, each given as (uv, vertices, triangles), scaled to the same texel density and about the area
+    1 all together; and which, (k,) bool, are larger, since single precision could not tell their vertices apart."""
+    uvs, vertices, triangles = (list(each) for each in zip(*islands, strict=True))
+    in_space, in_layout = (
+        areas(list(zip(vertices, triangles, strict=True))),
+        uv_areas(list(zip(uvs, triangles, strict=True))),
+    )
+    share = in_space / in_space.sum()
+    least = _FINEST**2 * np.array([len(each) for each in triangles])
+    scale = np.sqrt(np.maximum(share, least) / np.maximum(in_layout, 1e-300))
+    return [uv * size for uv, size in zip(uvs, scale.tolist(), strict=True)], share < least
+
+
 def areas(islands: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """The areas in space, (k,), of islands given as (vertices, triangles)."""
     points, triangles, _, starts = joined(*zip(*islands, strict=True))
@@ -139,4 +165,6 @@ def boxes(uvs: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 def _centre(corners):
     """The centre of area, (2,), of triangles (t, 3, 2), all counted as positive."""
     weight = np.abs(signed_areas(corners))
+    if not weight.any():
+        weight = np.ones(len(corners))
     return weight @ corners.mean(axis=1) / weight.sum()

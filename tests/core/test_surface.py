@@ -158,3 +158,16 @@ def test_zero_area_triangles_are_survived():
     surface = Surface(vertices, triangles)
     assert surface.degenerate[5] and surface.degenerate[20]
     assert (surface.area > 0).all() and np.isfinite(surface.rest).all()
+
+
+def test_of_equal_rims_the_lower_one_is_the_outline_whatever_the_numbers_are():
+    vertices, triangles = shapes.ring(12, 4)
+    angle = np.arctan2(vertices[:, 1], vertices[:, 0])
+    level = np.round(np.hypot(vertices[:, 0], vertices[:, 1]), 6)
+    vertices = np.column_stack([np.cos(angle), np.sin(angle), level])  # rolled up to a tube
+    low = level.min()
+    for seed in range(5):
+        order = np.random.default_rng(seed).permutation(len(vertices))
+        number = np.argsort(order)
+        outline = Surface(vertices[order], number[triangles]).outlines[0]
+        assert (vertices[order][outline][:, 2] == low).all()
