@@ -8,14 +8,16 @@ from collections.abc import Generator, Sequence
 import bpy
 import numpy as np
 
-from ..core import Settings, Shape, UnwrapError, distortion, placing, unwrap_islands
-from ..core.certificate import are_injective, orientation
+from ..core import Settings, Shape, Surface, UnwrapError, distortion, placing, unwrap_islands
+from ..core.certificate import are_injective, as_stored, orientation
 from ..core.contacts import touches_along_seams_only
+from ..core.delaunay import triangulate
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import attached, find_islands
-from ..core.pieces import joined, numbers
+from ..core.pieces import joined, numbers, starts_of
 from ..core.stepping import mapped
 from ..core.triangles import areas_in_space
+from ..core.unfolding import unfolded, unfolded_in_air
 from . import layout, mesh_arrays, modes, stacking
 from .last_run import last_run
 from .options import MeshOptions
@@ -48,6 +50,7 @@ def unwrap_targets(
     return outcomes
 
 
+_ROUNDED = 1e-2  # of an island's area, that triangles flipped by rounding may have
 _UNWRAPPING = 0.9  # of all the work, by and large; the rest is to see what lies on what
 
 
@@ -66,10 +69,18 @@ def _placed(works, options, context):
     that have UVs now."""
     layout.place([work for work in works if work.uv is not None], works, options, context)
     placed = [work for work in works if work.uv is not None]
+    _judge(placed)
     if placed and options.placement != 'UNIT':
         rest = 1 - _UNWRAPPING
         yield from mapped(lambda share: _UNWRAPPING + rest * share, stacking.report_overlaps(placed, works, options))
     return placed
+
+
+def _stored_uvs(works):
+    """The works' new UVs, (n, 2) each, in Blender's single precision, as seen from where they are not mirrored."""
+    uvs = [work.written_uv for work in works]
+    stored = np.split(as_stored(np.concatenate(uvs)), starts_of(uvs)[1:])
+    return [uv * (-1, 1) if work.mirrored else uv for work, uv in zip(works, stored, strict=True)]
 
 
 def _works(target, settings, options):
@@ -127,7 +138,8 @@ def _shape(work):
             text = "its UVs are cut where there is no seam: mark the cuts with UV > Seams from Islands"
             raise UVError(text + (_HANGS if work.is_attached else ""))
         uv = None
-    return settings, Shape(work.vertices, work.triangles, uv, pinned if pinned.any() else None)
+    pinned = pinned if pinned.any() else None
+    return settings, Shape(work.vertices, work.triangles, uv, pinned, face=work.triangle_faces)
 
 
 def _without_uvs(settings):
@@ -147,6 +159,7 @@ def _explained(error, work):
 def _keep(work, result):
     report, outcome = result.report, work.outcome
     work.uv, work.loops, work.mirrored = result.uv, result.loops, report.mirrored
+    work.certified = report.injective
     outcome.before, outcome.after = report.before, report.after
     outcome.iterations, outcome.converged = report.iterations, report.converged
     outcome.warnings += (*report.warnings, *_remarks(work.island))
@@ -180,17 +193,53 @@ def _write(obj, works):
     areas = placing.areas([(work.vertices, work.triangles) for work in works])
     for work, area in zip(works, areas.tolist(), strict=True):
         work.outcome.area = area
-    _judge(works)
 
 
-def _judge(works):
-    """Say what there is to say of the UVs that Blender stores, rounded where they lie now, and of the triangles that it
-    draws.
+def pack_apart(targets: Sequence[Target], options: MeshOptions, context: bpy.types.Context) -> None:
+    """Pack the targets' islands, as they are, beside everything else in their meshes.
+
+    Raises `UnwrapError` where Blender's packer fails; then nothing is changed.
     """
-    uvs = [work.stored_uv for work in works]
+    found = [work for target in targets for work in _works(target, Settings(), options)]
+    works = [work for work in found if work.old_uv is not None and not work.is_cut]
+    if not works:
+        return
+    layout.pack_apart(works, options, context)
+    for work in works:
+        if work.outcome.error:
+            raise UnwrapError(work.outcome.error)
+    with modes.in_object_mode(context):
+        for obj, group in itertools.groupby(works, key=lambda work: work.target.obj):
+            corners, uvs = zip(*((work.island.corners, work.corner_uv) for work in group), strict=True)
+            mesh_arrays.write(obj, np.concatenate(corners), np.concatenate(uvs))
+
+
+def _judge(works, opening=True):
+    """Say what there is to say of the UVs that Blender will store, rounded where they lie now, and of the triangles
+    that it draws.
+
+    What is certified but for rounding is opened there, if `opening`.
+    """
+    if not works:
+        return
+    uvs = _stored_uvs(works)
     uv, triangles, first, triangle_starts = joined(uvs, [work.drawn for work in works])
     piece = numbers(triangle_starts, len(triangles))
     sign = orientation(uv, triangles)
+    loops = [loop + start for work, start in zip(works, first, strict=True) for loop in work.loops]
+    solid = sign != 0  # those without area do not count, unless they should have some
+    loop_piece = np.repeat(np.arange(len(works)), [len(work.loops) for work in works])
+    certified = are_injective(uv, triangles[solid], piece[solid], loops, loop_piece)
+    if opening:
+        rounded = [
+            work for work, certain in zip(works, certified.tolist(), strict=True) if not certain and _opened(work)
+        ]
+        if rounded:
+            _judge(rounded, opening=False)
+            mended = {id(work) for work in rounded}
+            _judge([work for work in works if id(work) not in mended], opening=False)
+            return
+
     redrawn = [k for k, work in enumerate(works) if work.is_redrawn]
     changed = sign != np.concatenate([work.outcome.after.triangle_orientation for work in works])
     for k in np.union1d(np.unique(piece[changed]), redrawn).astype(int):
@@ -202,10 +251,6 @@ def _judge(works):
         if work.island.doubled_faces:
             _judge_doubled(work, orientation(its_uv, work.doubled))
 
-    loops = [loop + start for work, start in zip(works, first, strict=True) for loop in work.loops]
-    solid = sign != 0  # those without area do not count, unless they should have some
-    loop_piece = np.repeat(np.arange(len(works)), [len(work.loops) for work in works])
-    certified = are_injective(uv, triangles[solid], piece[solid], loops, loop_piece)
     flipped = np.zeros(len(works), dtype=bool)
     flipped[piece[sign < 0]] = True
     for work, its_uv, certain, upside_down in zip(works, uvs, certified.tolist(), flipped.tolist(), strict=True):
@@ -215,6 +260,20 @@ def _judge(works):
             outcome.injective = touches_along_seams_only(its_uv, work.loops, work.place)
             if outcome.injective:
                 outcome.warnings += ("it touches itself along a seam, and covers nothing twice",)
+
+
+def _opened(work):
+    """Whether an island that was certified before it was placed could be opened so that it is so in its place."""
+    if not work.certified:
+        return False
+    seen = (-1, 1) if work.mirrored else (1, 1)
+    surface, uv, held = Surface(work.vertices, work.triangles), work.uv * seen, work.held
+    opened, done = unfolded_in_air(surface, uv, held, triangulate)
+    if not done:
+        opened, (done,) = unfolded(surface, uv, held, _ROUNDED)
+    if done:
+        work.uv = opened * seen
+    return bool(done)
 
 
 def _judge_drawn(work, sign):

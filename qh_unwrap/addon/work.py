@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from ..core import Settings, placing
-from ..core.certificate import as_stored
 from ..core.islands import Island
 from . import mesh_arrays
 from .outcome import Outcome
@@ -27,6 +26,7 @@ class Work:
     uv: np.ndarray | None = None  # (n, 2) the new ones
     loops: list | None = None  # its boundary
     mirrored: bool = False
+    certified: bool = False  # by the core, before it was placed
     in_frame: bool = False  # of the old UVs, because something of them is held
 
     @cached_property
@@ -98,20 +98,23 @@ class Work:
         return self.island.triangles
 
     @property
-    def corner_uv(self):
-        """The new UVs (c, 2) of its corners, the same for all of a vertex; one that stayed stays to the last bit."""
+    def triangle_faces(self):
+        """(t,) the face of the mesh that each triangle is a part of."""
+        return self.mesh.corner_faces[self.island.triangle_corners[:, 0]]
+
+    @property
+    def written_uv(self):
+        """(n, 2) the new UVs as they are written; one that stayed stays to the last bit."""
         uv = self.uv / self.aspect
         if self.in_frame:
             stayed = (self.uv == self.old_uv).all(axis=1)
             uv[stayed] = self.mesh.uv[self._source[stayed]]
-        return uv[self.island.corner_vertex]
+        return uv
 
     @property
-    def stored_uv(self):
-        """(n, 2) the new UVs in Blender's single precision, as seen from the side where they are not mirrored."""
-        uv = np.empty_like(self.uv)
-        uv[self.island.corner_vertex] = as_stored(self.corner_uv)
-        return uv * (-1, 1) if self.mirrored else uv
+    def corner_uv(self):
+        """(c, 2) the new UVs of its corners, the same for all of a vertex."""
+        return self.written_uv[self.island.corner_vertex]
 
     @property
     def is_cut(self):
@@ -149,6 +152,16 @@ class Work:
     def is_redrawn(self):
         """Whether Blender cuts some of its faces into other triangles than the core gets."""
         return not np.array_equal(self.island.triangle_corners, self.island.drawn_corners)
+
+    @property
+    def held(self):
+        """(n, 2) bool, which of its new UVs have to stay where they are."""
+        held = np.zeros(self.uv.shape, dtype=bool)
+        if self.in_frame:
+            held[(self.uv == self.old_uv).all(axis=1)] = True
+        elif self.settings.boundary != 'FREE':
+            held[np.concatenate(self.loops)] = True
+        return held
 
     @property
     def is_attached(self):

@@ -87,6 +87,7 @@ class Batched:
     def __init__(self, shapes: Sequence[Shape], settings: Settings):
         self.errors: dict[int, UnwrapError] = {}
         self._sorted: dict[int, locality.Sorted] = {}
+        self._face = {k: shape.face for k, shape in enumerate(shapes) if shape.face is not None}
         checked: dict[int, Shape] = {}
         for k, shape in enumerate(shapes):
             try:
@@ -102,6 +103,13 @@ class Batched:
     def sorted(self, k: int, values: np.ndarray) -> np.ndarray:
         """Values at the vertices of shape k, (n, ...), in the batch's order."""
         return self._sorted[k].sorted(values) if k in self._sorted else values
+
+    def face(self, k: int) -> np.ndarray | None:
+        """The polygon that each triangle of shape k is a part of, (m,), in the batch's order, or None."""
+        face = self._face.get(k)
+        if face is None or k not in self._sorted:
+            return face
+        return np.asarray(face)[self._sorted[k].own_triangles(np.arange(len(face)))]
 
     def restored_result(self, k: int, result: Result) -> Result:
         """The result of shape k, in its own order."""
@@ -121,6 +129,8 @@ class Batched:
             raise ShapeError(f"partners must be vertices, in the shape ({n}, 2)")
         if partner is not None and uv is None:
             raise UVError("vertices that keep their distance need UVs, and there are none")
+        if shape.face is not None and np.shape(shape.face) != (len(triangles),):
+            raise ShapeError(f"there must be a face for each of the {len(triangles)} triangles")
         if n <= locality.MANY:
             return Shape(vertices, triangles, uv, pinned, partner)
         mesh = self._sorted[k] = locality.Sorted(vertices, triangles)

@@ -49,6 +49,23 @@ class Course(Improvement):
             yield from self._free()
         else:
             yield from self._outlined()
+        self._keep_what_was_valid()
+
+    def _keep_what_was_valid(self) -> None:
+        """Where the map has flips and the given one has none, take that; but a start that is wanted as it is stays."""
+        batch, settings = self.batch, self.settings
+        if not (settings.repair and (settings.iterations or self.refining) and batch.has_uv.any()):
+            return
+        surface = batch.surface
+        spoilt = batch.has_uv & wrong_pieces([surface], self.placed(self.best))
+        if spoilt.any():
+            spoilt &= ~wrong_pieces([surface], batch.uv)
+        for k in np.flatnonzero(spoilt).tolist():
+            its = batch.rows_of(k)
+            self.best[its] = self.now[its] = batch.uv[its]
+            self.sure[k], self.valid[k] = False, True
+            pins = "with these pins " if batch.has_pins[k] else ""
+            self.warnings[k] = (f"its UVs stay as they were: {pins}no other map without flips was found",)
 
     def resume(self, settings: Settings) -> Steps:
         """Go on from the maps as they are with other settings, or with what the batch now fixes."""
@@ -179,7 +196,7 @@ class Course(Improvement):
             self._make_airs(still, start, airs)
             missing &= ~crossed | still
         for within in self._portions(pieces & ~missing):
-            its = [airs[k] for k in np.flatnonzero(within)]
+            its = [airs[k] for k in np.flatnonzero(within).tolist()]
             yield from self.improve(self._group(within, start, partial(Plane, airs=its, triangulate=self._triangulate)))
         if missing.any():
             for k in np.flatnonzero(missing):

@@ -142,7 +142,7 @@ class Triangles:
 
     def largest(self, values: np.ndarray) -> np.ndarray:
         """Of values (m,), not negative, over each piece, (p,)."""
-        return np.maximum.reduce([chart.largest(values[part]) for chart, part in self])
+        return np.stack([chart.largest(values[part]) for chart, part in self]).max(axis=0)
 
 
 class Fixed(NamedTuple):

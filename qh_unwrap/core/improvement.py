@@ -22,9 +22,11 @@ from .energy import energies, map_scale
 from .errors import UnwrapError
 from .quasi_harmonic import Iteration
 from .settings import Settings
+from .unfolding import unfolded
 
 _HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement
 ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
+_FOLDED = 0.2  # of a surface's area, that flipped triangles may have for it to be worth unfolding
 _FEW = 0.5  # once only this part of the vertices still moves, the others take part no longer
 
 Steps = Generator[None, None, None]
@@ -174,7 +176,12 @@ class Improvement:
         latest, and valid in those that are `sound` (p',) bool.
         """
         self.sure[group.pieces] = False
-        self.best[group.rows] = np.where(recalled[group.domain.island.vertex_piece, None], best, group.island_uv)
+        island = group.domain.island
+        best = np.where(recalled[island.vertex_piece, None], best, group.island_uv)
+        if self.settings.repair:
+            best, opened = unfolded(island, best, group.domain.constrained.held[: len(best)], _FOLDED)
+            recalled, sound = recalled | opened, sound | opened
+        self.best[group.rows] = best
         if not self.refining:
             return
         if recalled.any():

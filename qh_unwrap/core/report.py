@@ -22,6 +22,7 @@ class Shape:
                (RECTANGLE)
     partner    (n, 2) int, for U and V of every vertex the vertex that it keeps its distance from, itself for nobody
                (boundary FREE or KEEP, with `uv`)
+    face       (m,) int, the polygon that each triangle is a part of, where warnings are to speak of polygons
     """
 
     vertices: np.ndarray
@@ -29,6 +30,7 @@ class Shape:
     uv: np.ndarray | None = None
     pinned: np.ndarray | None = None
     partner: np.ndarray | None = None
+    face: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +95,18 @@ class Result:
     loops: list[np.ndarray] = field(repr=False)
 
 
-def face_warnings(flat: int) -> tuple[str, ...]:
-    """The warning, in a tuple, that so many faces are `flat`, without area; an empty tuple for none."""
+def face_warnings(flat: np.ndarray, face: np.ndarray | None) -> tuple[str, ...]:
+    """The warning, in a tuple, that faces have no area; an empty tuple for none.
+
+    flat  (m,) bool, the triangles without area
+    face  (m,) int, the face that each is a part of, None where each is one
+    """
+    count = int(flat.sum())
+    if count and face is not None:
+        faces, parts = np.unique(face, return_inverse=True)
+        count = len(faces) - len(np.unique(parts[~flat]))
+    return _zero_area(count)
+
+
+def _zero_area(flat):
     return (f"{flat} {'face has' if flat == 1 else 'faces have'} zero area",) if flat else ()

@@ -136,7 +136,8 @@ class Unwrapper:
             raise UnwrapError("there are no results: the session was cancelled, or has not begun")
         found: dict[int, Result | UnwrapError] = dict(self._input.errors)
         if self._course is not None:
-            for k, result in zip(self._course.batch.index.tolist(), self._made(self._course), strict=True):
+            made = self._made(self._course, self._input)
+            for k, result in zip(self._course.batch.index.tolist(), made, strict=True):
                 found[k] = result if isinstance(result, UnwrapError) else self._input.restored_result(k, result)
         return [found[k] for k in range(self._count)]
 
@@ -152,7 +153,7 @@ class Unwrapper:
         one = course.batch.surface.one(k)
         return course.placed(course.now[its], np.array([k]), one)
 
-    def _made(self, course):
+    def _made(self, course, given):
         batch, surface = course.batch, course.batch.surface
         chosen = course.placed(course.best)
         before = measure_pieces(surface, batch.uv) if batch.has_uv.any() else [None] * surface.piece_count
@@ -163,11 +164,16 @@ class Unwrapper:
             if certified.any():
                 part, rows = surface.of(~certified), batch.rows(~certified)
             certified[~certified] = certified_pieces(part, chosen[rows])
-        flat = surface.sums(surface.degenerate.astype(int))
+        flat = surface.sums(surface.degenerate.astype(int)).tolist()
+        ends = np.append(surface.triangle_starts, len(surface.triangles)).tolist()
         for k, first in enumerate(surface.vertex_starts.tolist()):
             if k in course.faults:
                 yield course.faults[k]
                 continue
+            warnings = course.warnings[k]
+            if flat[k]:
+                its = surface.degenerate[ends[k] : ends[k + 1]]
+                warnings += face_warnings(its, given.face(int(batch.index[k])))
             report = Report(
                 before=before[k] if batch.has_uv[k] else None,
                 initial=initial[k],
@@ -177,7 +183,7 @@ class Unwrapper:
                 changes=tuple(course.changes[k]),
                 injective=bool(certified[k]) and not (after[k].flips or after[k].collapsed),
                 mirrored=bool(batch.mirror[k, 0] < 0),
-                warnings=course.warnings[k] + face_warnings(int(flat[k])),
+                warnings=warnings,
             )
             uv = chosen[batch.rows_of(k)] * batch.mirror[k]
             yield Result(uv, report, [loop - first for loop in surface.loops_of[k]])

@@ -17,11 +17,13 @@ from .initial import conformal, fit, project, weighted_map
 from .rings import ring_map
 from .settings import Settings
 from .triangles import corners_of, signed_areas
+from .unfolding import unfolded
 
 # The starts to choose from, the cheapest first, and the energy that needs no further one
 _CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "RINGS": 1000, "MEAN_VALUE": np.inf}
 # A surface bulges if its outline is so short: then neither its projection nor its conformal map is any good.
 _BULGING = 0.45  # of the squared outline, relative to that of a disk of the surface's area
+_TRACE = 1e-4  # of a surface's area, that flipped triangles may have for it to be as good as valid
 
 
 def natural_start(surface: Surface, settings: Settings, initial: str) -> np.ndarray:
@@ -59,7 +61,7 @@ def best_start(surface: Surface, settings: Settings) -> tuple[np.ndarray, np.nda
             continue
         pieces = np.flatnonzero(trying)
         part = surface if trying.all() else surface.of(trying)
-        uv = natural_start(part, settings, initial)
+        uv, _ = unfolded(part, natural_start(part, settings, initial), np.zeros((len(part.vertices), 2), bool), _TRACE)
         value = energies(part, uv, settings.balance)
         # What could be better is worth the certificate.
         sure = (value < least[pieces]) | ~certified[pieces]
@@ -94,7 +96,7 @@ def with_pins(surface: Surface, start: np.ndarray, uv: np.ndarray, pinned: np.nd
         if (uv[its][chosen] == uv[its][chosen][0]).all():  # one place tells neither size nor turn
             fitted = fit(start[its], np.ones(len(chosen), bool), uv[its])
             triangles = surface.triangles[surface.piece == k] - ends[k]
-            area, old = (np.abs(signed_areas(corners_of(each, triangles))).sum() for each in (fitted, uv[its]))
+            area, old = (float(np.abs(signed_areas(corners_of(each, triangles))).sum()) for each in (fitted, uv[its]))
             if area > 0 and old > 0:
                 fitted *= np.sqrt(old / area)
             fitted += (uv[its] - fitted)[chosen].mean(axis=0)

@@ -12,7 +12,10 @@ from typing import Any
 import numpy as np
 
 _AT_ONCE = 8192  # triangles, or entries of a matrix, in a part: what is made of them stays in the processor's cache
+_COLLAPSED = 0.1  # length, relative to that of an edge by and large, that a triangle gets which is all in one place
 _FLATTEST = 1e-6  # height, relative to its longest edge, below which a triangle has no area in single precision
+_LOWEST = 1e-7  # height below which it cannot be told from its rounding errors, where the whole surface has the area 1
+_OUTSIZE = 30  # lengths of an edge by and large, above which no longest edge makes a triangle count as flatter
 _THICKENED = 1e-2  # height, relative to its longest edge, that it gets: enough to stay valid, too little to bend a map
 
 
@@ -99,12 +102,13 @@ def laid_flat(points: np.ndarray, triangles: np.ndarray, size: float) -> tuple[n
         sides = np.roll(corners, -1, axis=1) - corners
         squares = (sides * sides).sum(axis=2).T
         base = np.argmax(squares, axis=0)
-        longest = np.maximum(np.sqrt(squares.max(axis=0)), shortest)
+        longest = np.sqrt(squares.max(axis=0))
+        longest = np.where(longest < shortest, _COLLAPSED * size, longest)
         # How far along its longest edge, the base, the third corner lies, and how high above it
         products = -(sides * np.roll(sides, 1, axis=1)).sum(axis=2).T
         along = np.choose(base, products) / longest
         height = np.linalg.norm(normals(corners), axis=1) / longest
-        degenerate = height < _FLATTEST * longest
+        degenerate = height < np.maximum(_FLATTEST * np.minimum(longest, _OUTSIZE * size), _LOWEST)
         height = np.where(degenerate, _THICKENED * longest, height)
         flat = np.zeros((2, *corner_vertex.shape))
         # The base begins at the origin, with that corner that has the number `base`.

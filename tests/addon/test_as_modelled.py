@@ -5,9 +5,10 @@ import bpy  # isort: skip
 import numpy as np
 import pytest
 from scenes import add_grid, changes, mesh_object, snapshot, uvs
+from scipy.spatial import Delaunay
 
 from qh_unwrap import last_report
-from qh_unwrap.addon import mesh_arrays
+from qh_unwrap.addon import layout, mesh_arrays
 from qh_unwrap.core.islands import attached
 
 
@@ -208,10 +209,10 @@ def test_a_slit_that_stays_closed_is_no_overlap(seams, options):
 
 
 def test_what_touches_elsewhere_is_not_certified():
-    """The outline's corner lies on an inner point's place, so that the faces there lie on others."""
+    """A point of the outline lies on the place of another one, to which no seam joins it."""
     points, faces = sheet(12)
     values = points[:, :2].copy()
-    values[0] = values[5 * 13 + 5]
+    values[6] = values[12 * 13 + 6]
     _, (report,) = unwrapped(points, faces, of_corners(faces, values), boundary='KEEP')
     assert not report["injective"]
 
@@ -245,3 +246,38 @@ def test_selected_faces_of_a_small_map_hang_on_the_others_only_where_it_is_whole
         mesh = mesh_arrays.read(obj)
         found = attached(mesh.corner_vertex, mesh.corner_edge, mesh.face_start, mesh.seam, selected, mesh.uv)
         assert found.any() == expected
+
+
+# Sizes
+
+
+@pytest.mark.parametrize("size", [1e-18, 1e-6, 1e6, 1e12, 1e19, 1e30])
+@pytest.mark.parametrize("placement", ["ORIGINAL", "PACK"])
+def test_a_mesh_of_any_size_gets_the_same_uvs(size, placement):
+    points, faces = sheet()
+    expected = uvs(unwrapped(points, faces, placement=placement)[0])
+    obj, (report,) = unwrapped(points * size, faces, placement=placement)
+    assert report["injective"]
+    np.testing.assert_allclose(uvs(obj), expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("placement", ["ORIGINAL", "PACK"])
+def test_what_would_vanish_beside_the_others_is_packed_larger(placement):
+    points, faces = sheet()
+    both = np.vstack([1e-6 * points, 1e6 * points])
+    _, reports = unwrapped(both, faces + [[c + len(points) for c in face] for face in faces], placement=placement)
+    assert [report["injective"] for report in reports] == [True, True]
+    assert [len(report["warnings"]) for report in reports] == [1, 0]
+
+
+@pytest.mark.parametrize("seed", range(2, 6))
+def test_what_rounding_would_flip_is_opened(seed, monkeypatch):
+    """Thin triangles of an island that comes to lie so far away that single precision has few digits for them."""
+    rng = np.random.default_rng(seed)
+    points = np.column_stack([rng.random((80, 2)), np.zeros(80)])
+    faces = Delaunay(points[:, :2]).simplices.tolist()
+    monkeypatch.setattr(layout.placing, "upright", lambda islands: [uv + (150_000, 0) for uv, *_ in islands])
+    monkeypatch.setattr(layout.packing, "pack", lambda groups, *_: [uv for uv, _ in groups[1.0]])
+    opened, (report,) = unwrapped(points, faces)
+    assert report["injective"]
+    assert uvs(opened)[:, 0].min() > 75_000
