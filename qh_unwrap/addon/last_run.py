@@ -8,25 +8,43 @@ import numpy as np
 import scipy
 
 from .. import __version__
-from .outcome import error_sentences, latest, sentences, summary
+from .options import MeshOptions
+from .outcome import error_findings, findings, latest, summary
 
 
 class LastRun:
-    """The latest run: its outcomes, those first that need a look, and what there is to say about them."""
+    """The latest run: its outcomes, those first that need a look, and what there is to say about them: lines, each with
+    the first outcome that it is said of."""
 
     def __init__(self):
         self.outcomes = latest
         self.ordered, self.errors, self.lines, self.summary, self.settings = [], [], [], "", {}
+        self.options = MeshOptions()
 
     def remember(self, outcomes, settings, options):
         self.outcomes[:] = outcomes
-        self.ordered = sorted(outcomes, key=lambda outcome: outcome.rank)
-        self.errors, self.lines, self.summary = error_sentences(outcomes), list(sentences(outcomes)), summary(outcomes)
         self.settings = dataclasses.asdict(settings) | dataclasses.asdict(options)
+        self.options = options
+        self.work_out()
+
+    def work_out(self):
+        """Work out anew what there is to show of the outcomes."""
+        outcomes = self.outcomes
+        self.ordered = sorted(outcomes, key=lambda outcome: outcome.rank)
+        self.errors, self.lines, self.summary = (
+            list(error_findings(outcomes)),
+            list(findings(outcomes)),
+            summary(outcomes),
+        )
 
     def forget(self):
         self.outcomes.clear()
         self.__init__()
+
+    @property
+    def overlapping(self):
+        """The outcomes of islands that lie on others since they were unwrapped."""
+        return [outcome for outcome in self.outcomes if outcome.overlaps and not outcome.error]
 
     def find(self, obj, number):
         """The outcome of an island, given by its object's name and its number, None if there is none."""
@@ -44,8 +62,7 @@ class LastRun:
         lines = [
             f"{', '.join(f'{name} {version}' for name, version in versions.items())}, {platform.platform()}",
             f"Settings: {', '.join(f'{name}={value}' for name, value in self.settings.items())}",
-            *self.errors,
-            *self.lines,
+            *(line for line, _ in (*self.errors, *self.lines)),
             self.summary,
         ]
         return "\n".join(lines) + "\n"

@@ -116,6 +116,16 @@ def last_report():
 
 def sentences(outcomes):
     """All that there is to say about what was unwrapped, a line for each kind of message."""
+    return [line for line, _ in findings(outcomes)]
+
+
+def error_sentences(outcomes):
+    """What kept islands from being unwrapped, a line for each kind of error."""
+    return [line for line, _ in error_findings(outcomes)]
+
+
+def findings(outcomes):
+    """The same as `sentences`, each with the first outcome that it is said of."""
     done = [outcome for outcome in outcomes if not outcome.error]
     yield from _lines((outcome, text) for outcome in done for text in outcome.remarks)
     lying = [outcome for outcome in done if outcome.overlaps]
@@ -123,24 +133,25 @@ def sentences(outcomes):
         return
     first, *others = lying
     if [outcome.label for outcome in others] in ([], list(first.overlaps)):
-        yield first.sentence(first.overlap)
+        yield first.sentence(first.overlap), first
     else:
         where = f"first: {first.name} on {first.overlaps[0]}"
-        yield f"{len(lying)} islands lie on others now ({where}): {first.overlap_cure}"
+        yield f"{len(lying)} islands lie on others now ({where}): {first.overlap_cure}", first
 
 
-def error_sentences(outcomes):
-    """What kept islands from being unwrapped, a line for each kind of error."""
-    return list(_lines((outcome, outcome.error) for outcome in outcomes if outcome.error))
+def error_findings(outcomes):
+    """The same as `error_sentences`, each with the first outcome that it is said of."""
+    yield from _lines((outcome, outcome.error) for outcome in outcomes if outcome.error)
 
 
 def _lines(remarks):
-    """A line for each kind among pairs of outcomes and texts, which names the first of those that it is said of."""
+    """A line for each kind among pairs of outcomes and texts, which names the first of those that it is said of, and
+    that one."""
     kinds = {}
     for outcome, text in remarks:
         kinds.setdefault(_kind(text), []).append((outcome, text))
     for (first, text), *others in kinds.values():
-        yield f"{len(others) + 1} islands (first: {first.name}): {text}" if others else first.sentence(text)
+        yield f"{len(others) + 1} islands (first: {first.name}): {text}" if others else first.sentence(text), first
 
 
 def _kind(text):

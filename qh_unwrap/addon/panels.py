@@ -40,8 +40,12 @@ class _ReportPanel:
     def draw(self, _context):
         self.layout.operator("uv.qh_unwrap_copy_report", icon='COPYDOWN')
         for icon, lines in (('ERROR', last_run.errors), ('INFO', last_run.lines)):
-            for line in lines:
-                _draw_text(self.layout.column(align=True), line, icon)
+            for line, outcome in lines:
+                row = self.layout.row()
+                _draw_text(row.column(align=True), line, icon)
+                _draw_select(row, outcome)
+        if last_run.overlapping:
+            self.layout.operator("uv.qh_unwrap_pack_overlapping", icon='UV_ISLANDSEL')
         for outcome in last_run.ordered[:_SHOWN]:
             _draw_outcome(self.layout.column(align=True), outcome)
         if len(last_run.ordered) > _SHOWN:
@@ -58,13 +62,18 @@ def _draw_text(column, text, icon):
         icon = 'BLANK1'
 
 
+def _draw_select(row, outcome):
+    """A button that selects the island's faces."""
+    button = row.operator("uv.qh_unwrap_select", text="", icon='RESTRICT_SELECT_OFF')
+    button.object, button.island = outcome.obj, outcome.number
+
+
 def _draw_outcome(column, outcome):
     """Its name, with a button that selects its faces if it needs a look, and its numbers if there are any."""
     row = column.row()
     row.label(text=outcome.label, icon='CHECKMARK' if outcome.is_clean else 'ERROR')
     if not outcome.is_clean:
-        button = row.operator("uv.qh_unwrap_select", text="", icon='RESTRICT_SELECT_OFF')
-        button.object, button.island = outcome.obj, outcome.number
+        _draw_select(row, outcome)
     if outcome.error and len(last_run.errors) > 1:  # which of them
         _draw_text(column, outcome.error, 'BLANK1')
     if not outcome.error:

@@ -10,6 +10,7 @@ _CLASSES = (
     properties.QHUnwrapSceneSettings,
     operators.QH_OT_unwrap,
     report_operators.QH_OT_select,
+    report_operators.QH_OT_pack_overlapping,
     report_operators.QH_OT_copy_report,
     panels.QH_PT_uv_editor,
     panels.QH_PT_view_3d,

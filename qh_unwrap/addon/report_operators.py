@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The buttons beside the last result: select an island's faces, and copy the report."""
+"""The buttons beside the last result: select an island's faces, pack what overlaps, and copy the report."""
+
+import itertools
 
 import bmesh
 import bpy
+import numpy as np
 
+from ..core import UnwrapError
 from .last_run import last_run
+from .selection import Target
+from .unwrapping import pack_apart
 
 
 class _OfLastResult:
@@ -38,7 +44,12 @@ class QH_OT_select(_OfLastResult, bpy.types.Operator):
     def execute(self, context):
         outcome = last_run.find(self.object, self.island)
         obj = context.view_layer.objects.get(self.object)
-        problem = self._problem(outcome, obj)
+        if outcome is None:
+            problem = f"{self.object} has no island {self.island} in the last result: unwrap again"
+        else:
+            problem = _problem(self.object, obj, [outcome])
+            if not problem and not obj.visible_get():
+                problem = f"{self.object} is hidden: show it first"
         if problem:
             self.report({'ERROR'}, problem)
             return {'CANCELLED'}
@@ -46,18 +57,18 @@ class QH_OT_select(_OfLastResult, bpy.types.Operator):
         _select_faces(obj, outcome.face_indices.tolist())
         return {'FINISHED'}
 
-    def _problem(self, outcome, obj):
-        """Why the island cannot be selected, and the cure; nothing if it can."""
-        if outcome is None:
-            return f"{self.object} has no island {self.island} in the last result: unwrap again"
-        if obj is None or obj.type != 'MESH':
-            return f"There is no mesh object {self.object} in this view layer any more: unwrap again"
-        if not obj.visible_get():
-            return f"{self.object} is hidden: show it first"
-        faces = len(bmesh.from_edit_mesh(obj.data).faces) if obj.mode == 'EDIT' else len(obj.data.polygons)
-        if faces <= outcome.face_indices.max():
-            return f"{self.object} has fewer faces than when it was unwrapped: unwrap again"
-        return ""
+
+def _problem(name, obj, outcomes):
+    """Why the object does not have the outcomes' faces any more, and the cure; nothing if it has."""
+    if obj is None or obj.type != 'MESH':
+        return f"There is no mesh object {name} in this view layer any more: unwrap again"
+    if _face_count(obj) <= max(outcome.face_indices.max() for outcome in outcomes):
+        return f"{name} has fewer faces than when it was unwrapped: unwrap again"
+    return ""
+
+
+def _face_count(obj):
+    return len(bmesh.from_edit_mesh(obj.data).faces) if obj.mode == 'EDIT' else len(obj.data.polygons)
 
 
 def _edit(obj, context):
@@ -92,6 +103,46 @@ def _select_faces(obj, indices):
     if bpy.app.version >= (5, 0, 0):
         bm.uv_select_sync_from_mesh()
     bmesh.update_edit_mesh(obj.data)
+
+
+class QH_OT_pack_overlapping(bpy.types.Operator):
+    """Pack the islands that lie on others since they were unwrapped, beside everything else; the others stay"""
+
+    bl_idname = "uv.qh_unwrap_pack_overlapping"
+    bl_label = "Pack Overlapping"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        if context.mode not in {'OBJECT', 'EDIT_MESH'}:
+            cls.poll_message_set("Needs Object Mode or the Edit Mode of a mesh")
+            return False
+        if last_run.overlapping:
+            return True
+        cls.poll_message_set("No island of the last result lies on another")
+        return False
+
+    def execute(self, context):
+        outcomes, targets = last_run.overlapping, []
+        for name, group in itertools.groupby(outcomes, key=lambda outcome: outcome.obj):
+            group = list(group)
+            obj = context.view_layer.objects.get(name)
+            problem = _problem(name, obj, group)
+            if problem:
+                self.report({'ERROR'}, problem)
+                return {'CANCELLED'}
+            faces = np.zeros(_face_count(obj), dtype=bool)
+            faces[np.concatenate([outcome.face_indices for outcome in group])] = True
+            targets.append(Target(obj, faces))
+        try:
+            pack_apart(targets, last_run.options, context)
+        except UnwrapError as error:
+            self.report({'ERROR'}, str(error))
+            return {'CANCELLED'}
+        for outcome in outcomes:
+            outcome.overlaps, outcome.more_overlaps = (), 0
+        last_run.work_out()
+        return {'FINISHED'}
 
 
 class QH_OT_copy_report(_OfLastResult, bpy.types.Operator):

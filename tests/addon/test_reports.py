@@ -155,8 +155,18 @@ def test_panel_lists_first_what_needs_a_look():
     bpy.ops.uv.qh_unwrap()
     texts, buttons = drawn()
     assert texts.index("Closed (6 faces)") < texts.index("Clean (9 faces)")
-    assert [button.idname for button in buttons] == ["uv.qh_unwrap_copy_report", "uv.qh_unwrap_select"]
-    assert (buttons[1].object, buttons[1].island) == ("Closed", 1)
+    copy, *selecting = buttons
+    assert copy.idname == "uv.qh_unwrap_copy_report"
+    assert {button.idname for button in selecting} == {"uv.qh_unwrap_select"}
+    assert [(button.object, button.island) for button in selecting] == 2 * [("Closed", 1)], "of the line, and its own"
+
+
+def test_every_line_of_the_panel_leads_to_an_island():
+    fins(3)
+    bpy.ops.uv.qh_unwrap()
+    texts, (_, button) = drawn()
+    assert "9 islands (first: Fins," in " ".join(texts[:2])
+    assert (button.object, button.island) == ("Fins", 1)
 
 
 def test_panel_says_which_error_is_whose():
@@ -266,6 +276,82 @@ def test_buttons_need_a_last_result():
         assert not operator.poll()
         with pytest.raises(RuntimeError, match="Nothing has been unwrapped yet"):
             operator()
+
+
+# Pack Overlapping
+
+
+def three_islands():
+    """Three stripes of a grid, of which the first two come to lie on each other in a circle; a map far from them."""
+    obj = add_grid(6, "Stripes")
+    corner = [obj.data.vertices[loop.vertex_index].co for loop in obj.data.loops]
+    x, y = np.array([(co.x, co.y) for co in corner]).T
+    for edge in obj.data.edges:
+        places = {round(obj.data.vertices[index].co.x, 5) for index in edge.vertices}
+        edge.use_seam = len(places) == 1 and round(abs(places.pop()), 5) == 0.33333
+    stripe = np.repeat(
+        [int(polygon.center.x * 1.5 + np.sign(polygon.center.x) / 2) for polygon in obj.data.polygons], 4
+    )
+    values = np.column_stack([x / 2 + 0.1 * stripe + 5 * (stripe == 1), y / 2])
+    obj.data.uv_layers.active.uv.foreach_set("vector", values.astype(np.float32).ravel())
+    return obj, stripe
+
+
+@pytest.mark.parametrize("mode", ['OBJECT', 'EDIT'])
+def test_packs_what_overlaps_and_nothing_else(mode):
+    obj, stripe = three_islands()
+    if mode == 'EDIT':
+        edit_mode()
+    bpy.ops.uv.qh_unwrap(boundary='CIRCLE')
+    assert [bool(outcome.overlaps) for outcome in operators.last_outcomes] == [True, True, False]
+    before = uvs(obj)
+    assert "uv.qh_unwrap_pack_overlapping" in [button.idname for button in drawn()[1]]
+    assert bpy.ops.uv.qh_unwrap_pack_overlapping() == {'FINISHED'}
+    assert obj.mode == mode
+    after = uvs(obj)
+    assert np.array_equal(after[stripe == 1], before[stripe == 1])
+    low, high = (np.array([end(after[stripe == k], axis=0) for k in (-1, 0, 1)]) for end in (np.min, np.max))
+    centre, radius = (low + high) / 2, (high - low).max(axis=1) / 2
+    for one in range(3):
+        for other in range(one):
+            assert np.linalg.norm(centre[one] - centre[other]) > radius[one] + radius[other], "circles apart"
+    for k in (-1, 0):  # the same shape as before, of another size and somewhere else
+        z, w = (each[stripe == k] @ (1, 1j) for each in (before, after))
+        z, w = z - z.mean(), w - w.mean()
+        turn = np.vdot(z, w)
+        np.testing.assert_allclose(w, z * turn / np.vdot(z, z), atol=1e-5)
+    assert not last_run.overlapping and "uv.qh_unwrap_pack_overlapping" not in [each.idname for each in drawn()[1]]
+    assert not bpy.ops.uv.qh_unwrap_pack_overlapping.poll()
+
+
+def test_packing_what_overlaps_can_be_undone():
+    obj, _ = three_islands()
+    bpy.ops.uv.qh_unwrap(boundary='CIRCLE')
+    before = uvs(obj)
+    bpy.ops.ed.undo_push()
+    assert bpy.ops.uv.qh_unwrap_pack_overlapping(True) == {'FINISHED'}
+    assert not np.array_equal(uvs(bpy.data.objects["Stripes"]), before)
+    bpy.ops.ed.undo()
+    assert np.array_equal(uvs(bpy.data.objects["Stripes"]), before)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [(rename, "There is no mesh object Stripes"), (lose_faces, "Stripes has fewer faces")],
+)
+def test_says_why_it_cannot_pack(change, message):
+    obj, _ = three_islands()
+    bpy.ops.uv.qh_unwrap(boundary='CIRCLE')
+    change(obj)
+    with pytest.raises(RuntimeError, match=message):
+        bpy.ops.uv.qh_unwrap_pack_overlapping()
+
+
+def test_nothing_to_pack():
+    add_grid(3)
+    bpy.ops.uv.qh_unwrap()
+    with pytest.raises(RuntimeError, match="No island of the last result lies on another"):
+        bpy.ops.uv.qh_unwrap_pack_overlapping()
 
 
 # Copy Report

@@ -21,6 +21,7 @@ def steps(gui):
     yield from _menus(gui)
     yield from _sidebars(gui)
     yield from _reports(gui)
+    yield from _troubles(gui)
     yield from _long_work(gui)
 
 
@@ -115,6 +116,90 @@ def _reports(gui):
     gui.shot("12_reports.png")
 
 
+def _troubles(gui):
+    """A mesh with many kinds of trouble: the panel leads to each."""
+    gui.area('INFO').type = 'IMAGE_EDITOR'
+    _add(gui, _troubled, lambda one, other: False)
+    gui.sidebar('VIEW_3D', "QH Unwrap")
+    yield 1
+    for below_top in (
+        _ADVANCED_BELOW_MESH,
+        _BUTTONS["Mesh"],
+        _BUTTONS["Layout"],
+    ):  # they leave room for the last result
+        gui.click(*_button(gui, 'VIEW_3D', below_top))
+        yield 1
+    gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Unwrap"]))
+    yield 2
+    gui.shot("17_troubles.png")
+    gui.move('VIEW_3D', fx=0.2, fy=0.9)
+    with gui.override('VIEW_3D'):
+        bpy.ops.uv.qh_unwrap_select(object="Troubles", island=1)
+        bpy.ops.view3d.view_selected()
+    yield 2
+    gui.shot("18_island_selected.png")
+
+
+def _troubled(calc_uvs):
+    """Adds a mesh of a closed cube, a torus with a hole, sheets with faces inside out and without area, two faces that
+    Blender cuts along one diagonal, and a Möbius band.
+    """
+    bm = bmesh.new()
+
+    def apart(number, geometry):
+        vertices = {vertex for each in geometry for vertex in getattr(each, "verts", [each])}
+        bmesh.ops.translate(bm, verts=list(vertices), vec=(3 * number, 0, 0))
+
+    def sheet(number):
+        made = bmesh.ops.create_grid(bm, x_segments=8, y_segments=8, size=1)["verts"]
+        for vertex in made:
+            vertex.co.z = 0.3 * np.sin(3 * vertex.co.x)
+        faces = list({face for vertex in made for face in vertex.link_faces})
+        apart(number, made)
+        return faces
+
+    apart(0, bmesh.ops.create_cube(bm, size=1.5)["verts"])
+    rings, sides = 24, 12
+    torus = [
+        bm.verts.new(((1 + 0.3 * np.cos(b)) * np.cos(a), (1 + 0.3 * np.cos(b)) * np.sin(a), 0.3 * np.sin(b)))
+        for a in 2 * np.pi * np.arange(rings) / rings
+        for b in 2 * np.pi * np.arange(sides) / sides
+    ]
+    for k in range(1, rings * sides):  # but for the first
+        (i, j), on = divmod(k, sides), (k // sides + 1) % rings * sides
+        up = (j + 1) % sides
+        bm.faces.new([torus[i * sides + j], torus[on + j], torus[on + up], torus[i * sides + up]])
+    apart(1, torus)
+    for face in sheet(2)[:3]:
+        face.normal_flip()
+    for vertex in sheet(3)[20].verts:
+        vertex.co = (9, 0, 0)
+    corners = [bm.verts.new(co) for co in ((0, 0, 0), (1, -0.1, 1), (2, 0, 0), (1, 1, 0), (1, 0, -1))]
+    bm.faces.new([corners[k] for k in (0, 1, 2, 3)])
+    bm.faces.new([corners[k] for k in (2, 1, 0, 4)])
+    apart(4, corners)
+    around, across = 40, 3
+    band = [
+        bm.verts.new(((1 + w * np.cos(a / 2)) * np.cos(a), (1 + w * np.cos(a / 2)) * np.sin(a), w * np.sin(a / 2)))
+        for a in 2 * np.pi * np.arange(around) / around
+        for w in 0.4 * (np.arange(across + 1) / across - 0.5)
+    ]
+
+    def at(i, j):
+        return band[i * (across + 1) + j] if i < around else band[across - j]
+
+    for i in range(around):
+        for j in range(across):
+            bm.faces.new([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)])
+    apart(5.5, band)
+    mesh = bpy.data.meshes.new("Troubles")
+    bm.to_mesh(mesh)
+    obj = bpy.data.objects.new("Troubles", mesh)
+    bpy.context.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+
+
 def _long_work(gui):
     """It shows how far it is; ESC, an error and another file end it, and leave nothing behind."""
     for area in (area for area in gui.window.screen.areas if area.type == 'VIEW_3D'):
@@ -184,7 +269,8 @@ def _sheet(size):
     return add
 
 
-_BUTTONS = {"Unwrap": 43, "Mesh": 289, "Advanced": 314}  # pixels below the top of the sidebar
+_BUTTONS = {"Unwrap": 43, "Layout": 161, "Mesh": 289, "Advanced": 314}  # pixels below the top of the sidebar
+_ADVANCED_BELOW_MESH = 418  # the same, where the section Mesh is open
 
 
 def _add(gui, add, is_seam):
