@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line: `qh-unwrap`, `python -m qh_unwrap` and `blender --command qh_unwrap`.
 
-Exit codes: 0 everything unwrapped, 1 something failed (what could be done is written), 2 wrong usage.
+Exit codes: 0 everything unwrapped, 1 something failed (the rest is written), 2 wrong usage, 3 nothing could be written;
+130 and 143 after SIGINT and SIGTERM.
 """
 
 import argparse
 import dataclasses
 import json
+import os
 import sys
 from contextlib import contextmanager
 from pathlib import Path
 
 from . import __version__
+from .addon import stopping, writing
+from .addon.failures import FileError, UsageError
 from .addon.options import MeshOptions
 from .core import Settings, UnwrapError
 from .core.stepping import finished
@@ -40,23 +44,18 @@ def unregister():
     bpy.utils.unregister_cli_command(_command)
 
 
-class _UsageError(Exception):
-    pass
-
-
-class _FileError(Exception):
-    pass
-
-
 def main(argv=None):
-    try:
-        return _run(_parser().parse_args(argv))
-    except SystemExit as stop:  # argparse, after --help or a wrong argument
-        return stop.code
-    except _UsageError as error:
-        return _complain(error, 2)
-    except _FileError as error:
-        return _complain(error, 1)
+    with stopping.stoppable():
+        try:
+            return _run(_parser().parse_args(argv))
+        except SystemExit as stop:  # argparse, after --help or a wrong argument
+            return stop.code
+        except UsageError as error:
+            return _complain(error, 2)
+        except FileError as error:
+            return _complain(error, 3)
+        except stopping.Stopped as stop:
+            return _complain(stop, stop.exit_code)
 
 
 def _complain(error, code):
@@ -102,66 +101,95 @@ def _run(args):
         settings, options = (_made_from(args, kind) for kind in (Settings, MeshOptions))
         settings.check_together()
     except UnwrapError as error:
-        raise _UsageError(error) from None
+        raise UsageError(error) from None
     try:
         import bpy
     except ImportError:
-        raise _UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
-    from .addon import files, outcome, preview, selection, unwrapping
+        raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
+    from .addon import checking, files, outcome, preview, selection, unwrapping
 
-    _check_files(args, files)
+    _check_files(args, files, preview)
     with _at_file("read", args.input, files):
         loaded = files.load(args.input)
     objects = _chosen(loaded, args)
+    _check_room(args, objects, files)
     files.prepare(objects, weld=args.weld, seams_from_islands=args.seams_from_islands)
     targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
     with files.quiet():
         outcomes = finished(unwrapping.unwrap_targets(targets, settings, options, bpy.context))
     if not outcomes:
-        raise _FileError(f"{', '.join(obj.name for obj in objects)}: there are no visible faces")
-    _print_table(outcomes, outcome)
+        raise FileError(f"{', '.join(obj.name for obj in objects)}: there are no visible faces")
 
     done = [outcome for outcome in outcomes if not outcome.error]
-    if args.output and done:
-        with _at_file("write", args.output, files):
-            files.save(args.output)
-    if args.preview and done:
-        with _at_file("write", args.preview, files):
-            preview.render(objects, outcomes, args.preview)
+    if done:
+        with writing.Staging(overwrite=args.overwrite) as staging:
+            if args.preview:
+                with _at_file("write", args.preview, files):
+                    staging.write(
+                        args.preview, lambda path: preview.render(targets, outcomes, path), checking.check_image
+                    )
+            if args.output:
+                with _at_file("write", args.output, files):
+                    files.stage(staging, args.output)
+            with _at_file("write", args.output or args.preview, files):
+                staging.put_in_place()
     if args.json:
-        with _at_file("write", args.json, files):
+        with _at_file("write", args.json, files), writing.Staging(overwrite=True) as staging:
             document = _document(args, settings, options, outcomes, bpy.app.version_string)
-            files.write_text(args.json, json.dumps(document, indent=2) + "\n")
-    return 0 if done and len(done) == len(outcomes) else 1
+            staging.write_text(args.json, json.dumps(document, indent=2) + "\n")
+            staging.put_in_place()
+    _print_table(outcomes, outcome)
+    return (0 if len(done) == len(outcomes) else 1) if done else 3
 
 
 @contextmanager
 def _at_file(verb, path, files):
     try:
-        with files.quiet():
+        with files.quiet(errors=True):
             yield
-    except (RuntimeError, OSError) as error:
-        raise _FileError(f"cannot {verb} {path}: {error}") from error
+    except (RuntimeError, OSError, FileError) as error:
+        stopping.check()
+        raise FileError(f"cannot {verb} {path}: {_reason(error)}") from error
+
+
+def _reason(error):
+    """One line of what Blender says, which may be a traceback."""
+    lines = [line for line in str(error).splitlines() if line.strip() and not line.startswith("Location:")]
+    return lines[-1].removeprefix("Error: ") if lines else type(error).__name__
 
 
 def _made_from(args, kind):
     return kind(**{field.name: getattr(args, field.name) for field in dataclasses.fields(kind)})
 
 
-def _check_files(args, files):
+def _check_files(args, files, preview):
     if args.input != "suzanne":
         args.input = Path(args.input)
         if not args.input.is_file():
-            raise _UsageError(f"there is no file {args.input}")
+            raise UsageError(f"there is no file {args.input}")
         if args.input.suffix.lower() not in files.READERS:
-            raise _UsageError(f"cannot read {args.input}: use {', '.join(files.READERS)}")
+            raise UsageError(f"cannot read {args.input}: use {', '.join(files.READERS)}")
     if args.output and args.output.suffix.lower() not in files.WRITERS:
-        raise _UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(files.WRITERS)}")
-    for path in filter(None, (args.output, _sibling(args.output), args.json, args.preview)):
+        raise UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(files.WRITERS)}")
+    if args.preview and args.preview.suffix.lower() not in preview.FORMATS:
+        raise UsageError(f"cannot write {args.preview}: pictures can be {', '.join(preview.FORMATS)}")
+    paths = list(filter(None, (args.output, _sibling(args.output), args.json, args.preview)))
+    for path in paths:
         if not path.absolute().parent.is_dir():
-            raise _UsageError(f"there is no folder {path.absolute().parent}")
+            raise UsageError(f"there is no folder {path.absolute().parent}")
         if path.exists() and not args.overwrite:
-            raise _UsageError(f"{path} exists: choose another name, or pass --overwrite")
+            raise UsageError(f"{path} exists: choose another name, or pass --overwrite")
+        if os.path.lexists(path) and not path.is_file():
+            raise UsageError(f"{path} is a folder, or no file to write to")
+    for path in paths:
+        writing.check_folder(path)
+
+
+def _check_room(args, objects, files):
+    sizes = {args.preview: 100_000} if args.preview else {}
+    if args.output:
+        sizes[args.output] = files.likely_size(args.output, args.input, objects)
+    writing.check_room(sizes)
 
 
 def _sibling(path):
@@ -172,11 +200,11 @@ def _sibling(path):
 
 def _chosen(objects, args):
     if not objects:
-        raise _FileError(f"there is no mesh in {args.input}")
+        raise FileError(f"there is no mesh in {args.input}")
     present = [obj.name for obj in objects]
     unknown = set(args.object or ()) - set(present)
     if unknown:
-        raise _UsageError(f"there is no mesh object {', '.join(sorted(unknown))}: the file has {', '.join(present)}")
+        raise UsageError(f"there is no mesh object {', '.join(sorted(unknown))}: the file has {', '.join(present)}")
     return [obj for obj in objects if not args.object or obj.name in args.object]
 
 

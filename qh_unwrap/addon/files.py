@@ -3,16 +3,18 @@
 
 import ctypes
 import os
+import sys
 import tempfile
-from contextlib import contextmanager, redirect_stdout
-from pathlib import Path
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from functools import cache
 
 import bmesh
 import bpy
 import numpy as np
 
 from ..core.islands import cuts
-from . import mesh_arrays, selection, suzanne
+from . import checking, mesh_arrays, selection, stopping, suzanne, writing
+from .failures import FileError
 
 
 def _read_blend(filepath):
@@ -73,7 +75,7 @@ def load(source):
         _new_scene()
         suzanne.add()
     else:
-        READERS[source.suffix.lower()](str(source.absolute()))
+        _require_finished(READERS[source.suffix.lower()](str(source.absolute())))
     if bpy.context.mode != 'OBJECT':
         bpy.ops.object.mode_set(mode='OBJECT')
     bpy.context.view_layer.update()
@@ -107,48 +109,89 @@ def _mark_cuts(obj):
 
 def save(path):
     """Write everything to `path`, which is replaced only when all went well."""
-    write = WRITERS[path.suffix.lower()]
-    if path.suffix.lower() == ".blend":  # paths in it are relative to its folder
-        temporary = path.absolute().with_name(f".qh-unwrap-{path.name}")
-        try:
-            write(str(temporary))
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    else:
-        with replacing(path) as temporary:
-            write(str(temporary))
+    with writing.Staging(overwrite=True) as staging:
+        stage(staging, path)
+        staging.put_in_place()
 
 
-def write_text(path, text):
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+def stage(staging, path):
+    """Write everything to a new file that waits in `staging` for the place of `path`."""
+    suffix = path.suffix.lower()
+    expected = checking.content()
+
+    def write(temporary):
+        _require_finished(WRITERS[suffix](str(temporary)))
+
+    def check(file):
+        checking.check(file, expected if file.suffix.lower() == suffix else None)
+
+    staging.write(path, write, check, beside=suffix == ".blend")  # where paths are relative to its folder
+
+
+def _require_finished(result):
+    """Raise `FileError` where an operator gave up without an exception."""
+    if result is not None and 'FINISHED' not in result:
+        raise FileError("Blender gave up")
+
+
+ONE_MAP = (".obj", ".ply")  # what holds a single UV map, which is the active one
+
+
+def likely_size(path, source, objects):
+    """A cautious guess, in bytes, of the size of the file that will be written: no more than it takes."""
+    corners = sum(len(obj.data.loops) for obj in objects)
+    vertices = sum(len(obj.data.vertices) for obj in objects)
+    same_kind = source != "suzanne" and source.suffix.lower() == path.suffix.lower()
+    return max(10 * vertices + 8 * corners, source.stat().st_size * 3 // 4 if same_kind else 0)
 
 
 @contextmanager
-def replacing(path):
-    """A place for a new file beside `path`; it and its siblings (.mtl, .bin, textures) move there at the end."""
-    path = path.absolute()
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".qh-unwrap-") as folder:
-        yield Path(folder, path.name)
-        written = [file for file in Path(folder).rglob("*") if file.is_file()]
-        for file in sorted(written, key=lambda file: file.name == path.name):
-            target = path.parent / file.relative_to(folder)
-            target.parent.mkdir(exist_ok=True)
-            os.replace(file, target)
+def quiet(errors=False):
+    """Keep what Blender prints from the standard output, which is for the table alone.
 
-
-@contextmanager
-def quiet():
-    """Keep what Blender prints from the standard output, which is for the table alone; errors are exceptions."""
+    errors   keep it from the standard error as well if an exception comes, which says it better; else it follows later
+    """
+    open_standard_streams()
     library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)  # Blender prints through a buffer of C, too
-    library.fflush(None)
-    saved = os.dup(1)
-    with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere):
-        os.dup2(nowhere.fileno(), 1)
-        try:
-            yield
-        finally:
-            library.fflush(None)
-            os.dup2(saved, 1)
-            os.close(saved)
+    with ExitStack() as stack:
+        nowhere = stack.enter_context(open(os.devnull, "w"))
+        later = stack.enter_context(tempfile.TemporaryFile("w+", errors="replace")) if errors else None
+        with _redirected(library, 1, nowhere), redirect_stdout(nowhere):
+            if later is None:
+                yield
+                return
+            with _redirected(library, 2, later), redirect_stderr(_stream_2()):
+                yield
+        later.seek(0)
+        if sys.stderr is not None:
+            sys.stderr.write(later.read())
+
+
+@cache
+def _stream_2():
+    """Python's way to stream 2, wherever that leads.  It stays open, since loggers of Blender's exporters keep it."""
+    return open(2, "w", buffering=1, errors="backslashreplace", closefd=False)
+
+
+def open_standard_streams():
+    """Lead the standard streams that are closed to nowhere, lest a file that is opened later takes the place of one."""
+    while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(handle)
+
+
+@contextmanager
+def _redirected(library, number, file):
+    """Lead stream 1 or 2 to a file."""
+    with stopping.undisturbed():
+        library.fflush(None)
+        saved = os.dup(number)
+        os.dup2(file.fileno(), number)
+    try:
+        yield
+    finally:
+        stopping.hold()
+        library.fflush(None)
+        os.dup2(saved, number)
+        os.close(saved)
+        stopping.release()

@@ -8,7 +8,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.islands import find_islands
-from . import files, mesh_arrays, selection
+from . import mesh_arrays
 
 _WIDTH, _HEIGHT = 1200, 600
 _PIXEL = 2 / _WIDTH  # the picture shows two unit squares side by side
@@ -19,34 +19,57 @@ _BACKGROUND = (0.86, 0.86, 0.86, 1.0)
 _GREY = (0.6, 0.6, 0.6)
 
 
-def render(objects, outcomes, path):
-    """Write the picture; what it needs in Blender is removed afterwards."""
+FORMATS = {".png": 'PNG', ".jpg": 'JPEG', ".jpeg": 'JPEG'}
+
+
+def render(targets, outcomes, path):
+    """Write the picture of what was unwrapped to a new file; what it needs in Blender is removed afterwards."""
     before = {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
     try:
-        scene = _scene(objects, outcomes)
-        with files.replacing(path) as temporary:
-            scene.render.filepath = str(temporary)
-            bpy.ops.render.render(write_still=True, scene=scene.name)
+        scene = _scene(targets, outcomes)
+        settings = scene.render.image_settings
+        settings.file_format = FORMATS[path.suffix.lower()]
+        settings.color_mode, settings.quality = 'RGB', 90
+        scene.render.use_file_extension = False
+        scene.render.filepath = _as_template(path)
+        bpy.ops.render.render(write_still=True, scene=scene.name)
     finally:
         for kind, present in before.items():
             bpy.data.batch_remove(set(getattr(bpy.data, kind)) - present)
 
 
-_KINDS = ("scenes", "objects", "meshes", "materials", "node_groups", "cameras", "lights", "worlds", "collections")
+def _as_template(path):
+    """The path as Blender wants it for pictures: from version 5 on, braces have a meaning there."""
+    return str(path).replace("{", "{{").replace("}", "}}") if bpy.app.version >= (5, 0, 0) else str(path)
 
 
-def _scene(objects, outcomes):
+_KINDS = (
+    "scenes",
+    "objects",
+    "meshes",
+    "materials",
+    "node_groups",
+    "cameras",
+    "lights",
+    "worlds",
+    "collections",
+    "images",
+)
+
+
+def _scene(targets, outcomes):
     scene = bpy.data.scenes.new("QH Unwrap Preview")
     failed = {(outcome.obj, outcome.number) for outcome in outcomes if outcome.error}
+    objects = [target.obj for target in targets]
     meshes = [mesh_arrays.read(obj) for obj in objects]
     sheets = []  # (object, mesh, island) of every island with new UVs, the largest first
-    for obj, mesh in zip(objects, meshes, strict=True):
+    for (obj, faces, _), mesh in zip(targets, meshes, strict=True):
         islands = find_islands(
             mesh.corner_vertex,
             mesh.corner_edge,
             mesh.face_start,
             mesh.seam,
-            selection.visible_faces(obj.data),
+            faces,
             mesh.corner_triangles,
         )
         sheets += [
@@ -77,6 +100,8 @@ def _add_models(scene, tints, material):
         mesh.materials.append(material)
         layer = mesh.color_attributes.new("QH Unwrap", 'FLOAT_COLOR', 'CORNER')
         layer.data.foreach_set("color", tint.astype(np.float32).ravel())
+        if mesh.uv_layers.active:
+            mesh.uv_layers.active.active_render = True  # what was unwrapped is what is shown
         copy = bpy.data.objects.new(obj.name, mesh)
         copy.matrix_world = place @ obj.matrix_world
         scene.collection.objects.link(copy)
@@ -180,7 +205,6 @@ def _add_camera_and_light(scene):
     scene.cycles.max_bounces = 0
     scene.render.resolution_x, scene.render.resolution_y = _WIDTH, _HEIGHT
     scene.render.resolution_percentage = 100
-    scene.render.image_settings.file_format = 'PNG'
 
 
 def _checker(name, cells, *, lit):

@@ -92,20 +92,20 @@ def test_failure_writes_the_rest_and_exits_with_1(tmp_path, capfd):
 def test_file_without_a_mesh(tmp_path, capfd):
     empty = tmp_path / "empty.obj"
     empty.write_text("# nothing\n")
-    assert main([str(empty)]) == 1
+    assert main([str(empty)]) == 3
     assert "there is no mesh" in capfd.readouterr().err
 
 
 def test_nothing_done_writes_nothing(tmp_path):
     source, target = make_file(tmp_path / "in.blend", cube=True), tmp_path / "out.blend"
-    assert main([str(source), "-o", str(target), "--object", "Box"]) == 1
+    assert main([str(source), "-o", str(target), "--object", "Box"]) == 3
     assert not target.exists()
 
 
 def test_file_that_is_no_mesh(tmp_path, capfd):
     broken, target = tmp_path / "broken.glb", tmp_path / "out.obj"
     broken.write_bytes(b"not a mesh")
-    assert main([str(broken), "-o", str(target)]) == 1
+    assert main([str(broken), "-o", str(target)]) == 3
     assert "broken.glb" in capfd.readouterr().err
     assert not target.exists()
 
@@ -156,7 +156,7 @@ def test_failed_writing_leaves_the_old_file(tmp_path, monkeypatch):
         raise RuntimeError("disk full")
 
     monkeypatch.setitem(files.WRITERS, ".obj", half)
-    assert main([str(source), "-o", str(target), "--overwrite"]) == 1
+    assert main([str(source), "-o", str(target), "--overwrite"]) == 3
     assert target.read_text() == "old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["in.mtl", "in.obj", "out.obj"]
 
@@ -191,7 +191,7 @@ def test_seams_from_islands(tmp_path):
     bpy.ops.mesh.primitive_cube_add()
     source = tmp_path / "cube.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(source), copy=True)
-    assert main([str(source)]) == 1, "closed"
+    assert main([str(source)]) == 3, "closed"
     target = tmp_path / "out.blend"
     assert main([str(source), "--seams-from-islands", "-o", str(target)]) == 0
     (obj,) = files.load(target)

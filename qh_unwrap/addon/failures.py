@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Why a run on a file ends without a result; needs no Blender."""
+
+
+class UsageError(ValueError):
+    """What was asked for cannot be meant: nothing was read or written, and the message says what to change."""
+
+
+class FileError(Exception):
+    """A file could not be read or written; what was there before is still there."""
