@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """QH Unwrap: quasi-harmonic maps for Blender.  `qh_unwrap.core` needs no Blender."""
 
+from .addon.failures import UsageError as UsageError
+
 __version__ = "0.1.0"
 
 
@@ -30,3 +32,19 @@ def last_report():
     from .addon import outcome
 
     return outcome.last_report()
+
+
+def unwrap_file(path, output=None, **options):
+    """Unwrap a file and write it to `output`, if that is given, as the command line does.
+
+    path      a file that Blender reads, or "suzanne"; it is opened in place of what is open in Blender
+    options   named like the flags, with underscores: `boundary="CIRCLE"`, `uv_map="Lightmap"`, `overwrite=True`; those
+              that may be repeated (`object`, `collection`, `material`) are a text or a list of texts
+
+    Returns the dictionary that `--json` writes.  Its `exit_code` is 0 if all is well, 1 if some islands failed, and 3,
+    with the reason in `error`, if nothing could be written: none of that raises anything.  Raises `UsageError`, a
+    `ValueError`, for what the command line would call wrong usage; then nothing was read or written.
+    """
+    from . import cli
+
+    return cli.unwrap_file(path, output, **options)

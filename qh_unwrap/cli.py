@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command line: `qh-unwrap`, `python -m qh_unwrap` and `blender --command qh_unwrap`.
+"""The command line: `qh-unwrap`, `python -m qh_unwrap` and `blender --command qh_unwrap`; and the same for Python.
 
 Exit codes: 0 everything unwrapped, 1 something failed (the rest is written), 2 wrong usage, 3 nothing could be written;
 130 and 143 after SIGINT and SIGTERM.
@@ -9,22 +9,52 @@ import argparse
 import dataclasses
 import json
 import os
-import sys
-from contextlib import contextmanager
+import traceback
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from . import __version__
+from . import __version__, console
 from .addon import stopping, writing
+from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
 from .addon.failures import FileError, UsageError
 from .addon.options import MeshOptions
 from .core import Settings, UnwrapError
-from .core.stepping import finished
+from .core.stepping import finished, mapped
 
 _DESCRIPTION = "Unwrap meshes with little distortion and without flipped faces."
 _INPUT = (
     "a .blend, .obj, .ply, .stl, .glb, .gltf, .fbx, .usd, .usda or .usdc file,"
     " or the word 'suzanne' for Blender's monkey with seams"
 )
+_EPILOG = """\
+examples:
+  qh-unwrap model.obj -o unwrapped.obj
+      unwrap every island with the least distortion
+  qh-unwrap model.fbx -o unwrapped.fbx --json report.json --strict
+      for a pipeline: 1 if an island is not certified, and all the numbers in a file
+  qh-unwrap scene.blend -o scene.blend --overwrite --object 'Wall*' --uv-map Lightmap --placement PACK
+      pack a second UV map of some objects, in the same file
+  qh-unwrap model.obj --boundary CIRCLE --balance 0.5 --refine 0 --preview picture.png
+      look at the published map, and write nothing else
+
+exit codes:
+  0  everything is unwrapped
+  1  some islands failed, or with --strict are not certified; the rest is written
+  2  wrong usage
+  3  nothing could be written: nothing was unwrapped, or a file could not be read or written
+  130, 143  stopped by Ctrl C or SIGTERM; nothing half done is left
+"""
+_NEEDS = {  # what each flag counts with, where its description does not say so
+    "aspect": "only with --boundary RECTANGLE",
+    "weights": "all but COTANGENT need another --boundary than FREE",
+    "initial": "CURRENT needs UVs",
+    "fill_holes": "only with another --boundary than FREE",
+    "tensor_power": "only in the iterations, not in the refinement",
+    "tolerance": "only with --refine 0",
+    "margin_method": "only where islands are packed",
+    "margin": "only where islands are packed",
+    "rotate": "only with --placement PACK",
+}
 
 
 _command = None
@@ -47,99 +77,271 @@ def unregister():
 def main(argv=None):
     with stopping.stoppable():
         try:
-            return _run(_parser().parse_args(argv))
-        except SystemExit as stop:  # argparse, after --help or a wrong argument
+            args = _parser().parse_args(argv)
+        except SystemExit as stop:  # argparse, after --help
             return stop.code
         except UsageError as error:
-            return _complain(error, 2)
-        except FileError as error:
-            return _complain(error, 3)
-        except stopping.Stopped as stop:
-            return _complain(stop, stop.exit_code)
+            args, record = _understood(argv), Record()
+            record.fail(USAGE, error)
+            _finish(args, record)
+        else:
+            bar = console.Bar(wanted=not args.quiet)
+            record = _carried_out(args, bar)
+            bar.close()
+        with suppress(stopping.Stopped):  # all is done: who stops now has read enough
+            _show(args, record)
+        return record.exit_code
 
 
-def _complain(error, code):
-    print(f"qh-unwrap: error: {error}", file=sys.stderr)
-    return code
+def unwrap_file(path, output=None, **options):
+    """Unwrap a file as the command line does; see `qh_unwrap.unwrap_file`."""
+    args = _parser().parse_args(["suzanne"])
+    known = {name: value for name, value in vars(args).items() if name not in _NOT_IN_PYTHON}
+    unknown = sorted(options.keys() - known.keys())
+    if unknown:
+        raise UsageError(f"there is no option {', '.join(unknown)}: use {', '.join(known)}")
+    if str(options.get("json")) == "-":
+        raise UsageError("json is the path of a file here: the report is what is returned")
+    for name, value in options.items():
+        if isinstance(known[name], bool) and value not in (True, False):
+            raise UsageError(f"{name} is {value!r}: choose True or False")
+        if name in _REPEATABLE and isinstance(value, str):
+            value = [value]
+        elif name in ("json", "preview") and value is not None:
+            value = Path(value)
+        elif isinstance(value, str) and isinstance(known[name], str):
+            value = value.upper()
+        setattr(args, name, value)
+    if args.uv_map is not None and args.texcoord is not None:
+        raise UsageError("uv_map and texcoord exclude each other")
+    args.input, args.output = os.fspath(path), Path(output) if output is not None else None
+    record = _carried_out(args)
+    if record.exit_code == USAGE:
+        raise UsageError(record.error)
+    return record.to_dict()
+
+
+_NOT_IN_PYTHON = ("input", "output", "quiet", "verbose")
+_REPEATABLE = ("object", "collection", "material")
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message):
+        raise UsageError(f"{message} (qh-unwrap --help tells all flags)")
 
 
 def _parser():
-    parser = argparse.ArgumentParser(prog="qh-unwrap", description=_DESCRIPTION)
+    parser = _Parser(
+        prog="qh-unwrap",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
     parser.add_argument("input", metavar="INPUT", help=_INPUT)
     parser.add_argument("-o", "--output", type=Path, help="file to write, in any of these formats except .stl")
     parser.add_argument("--object", action="append", metavar="NAME", help="unwrap this object only; may be repeated")
     parser.add_argument("--weld", action="store_true", help="first join vertices that lie at the same place")
     parser.add_argument("--seams-from-islands", action="store_true", help="first mark the cuts of the old UVs as seams")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to this file")
-    parser.add_argument("--preview", type=Path, metavar="FILE.png", help="draw the model and its UVs, checkered")
+    parser.add_argument(
+        "--collection",
+        action="append",
+        metavar="NAME",
+        help="unwrap the objects in this collection only; may be repeated."
+        " Here as in --object and --material, NAME can be a pattern like 'Wall*' or '*[0-9]'",
+    )
+    parser.add_argument(
+        "--material", action="append", metavar="NAME", help="unwrap the faces with this material only; may be repeated"
+    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--uv-map", metavar="NAME", help="write into this UV map, not the active one; it is made where it is missing"
+    )
+    which.add_argument(
+        "--texcoord", type=int, metavar="N", help="write into the N-th UV map, from 0; the next one after all is made"
+    )
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="write a report, also if the run fails; - prints it, and no table"
+    )
+    parser.add_argument(
+        "--preview", type=Path, metavar="FILE", help="draw the model and its UVs, checkered, into a .png or .jpg file"
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    parser.add_argument("--strict", action="store_true", help="count islands that are not certified as failed")
+    loudness = parser.add_mutually_exclusive_group()
+    loudness.add_argument("--quiet", action="store_true", help="show nothing but errors")
+    loudness.add_argument("--verbose", action="store_true", help="show every island, however many there are")
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     for title, kind in (("unwrapping", Settings), ("mesh and placement", MeshOptions)):
         group = parser.add_argument_group(title)
         for field in dataclasses.fields(kind):
-            group.add_argument(f"--{field.name.replace('_', '-')}", **_argument(field))
+            action = group.add_argument(f"--{field.name.replace('_', '-')}", **_argument(field))
+            action.help = _help(field).replace("%", "%%")
     return parser
 
 
 def _argument(field):
-    meta = field.metadata
-    description = meta["description"].replace("%", "%%")
     if type(field.default) is bool:
-        return dict(action=argparse.BooleanOptionalAction, default=field.default, help=description)
-    if meta["choices"]:
-        names = [choice.identifier for choice in meta["choices"]]
-        texts = "; ".join(f"{choice.identifier}: {choice.description}" for choice in meta["choices"])
-        help = f"{description} (default {field.default}). {texts}"
-        return dict(type=str.upper, choices=names, metavar="NAME", default=field.default, help=help)
-    low, high = meta["range"]
-    help = f"{description} ({low:g} to {high:g}, default {field.default:g})"
-    return dict(type=type(field.default), metavar="NUMBER", default=field.default, help=help)
+        return dict(action=argparse.BooleanOptionalAction, default=field.default)
+    if field.metadata["choices"]:
+        names = [choice.identifier for choice in field.metadata["choices"]]
+        return dict(type=str.upper, choices=names, metavar="NAME", default=field.default)
+    return dict(type=type(field.default), metavar="NUMBER", default=field.default)
 
 
-def _run(args):
+def _help(field):
+    meta, default = field.metadata, field.default
+    notes = [_NEEDS[field.name]] if field.name in _NEEDS else []
+    if type(default) is bool:
+        notes.append(f"default {'on' if default else 'off'}")
+    elif meta["choices"]:
+        notes.append(f"default {default}")
+    else:
+        low, high = meta["range"]
+        notes.append(f"{low:g} to {high:g}, default {default:g}")
+    texts = "; ".join(f"{choice.identifier}: {choice.description}" for choice in meta["choices"])
+    return f"{meta['description']} ({'; '.join(notes)}){f'. {texts}' if texts else ''}"
+
+
+def _understood(argv):
+    """What counts of arguments that are wrong in some other place: where to write the report, and how."""
+    parser = _Parser(add_help=False, allow_abbrev=False)
+    parser.add_argument("--json", type=Path)
+    for name in ("overwrite", "quiet", "verbose"):
+        parser.add_argument(f"--{name}", action="store_true")
+    try:
+        args, others = parser.parse_known_args(argv)
+    except UsageError:
+        args, others = parser.parse_args([]), []
+    if args.json and any(_is_same(args.json, each.partition("=")[2] or each) for each in others):
+        args.json = None  # it names the input, or another file
+    return args
+
+
+def _is_same(one, other):
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
+def _carried_out(args, progress=None):
+    """Do it; returns the `Record` of it, which is in the file for the report as well if one is wanted."""
+    record = Record()
+    try:
+        _run(args, record, progress)
+    except UsageError as error:
+        record.fail(USAGE, error)
+    except FileError as error:
+        record.fail(FAILED, error)
+    except stopping.Stopped as stop:
+        stopping.heard()
+        record.fail(stop.exit_code, stop)
+    except Exception as error:  # a fault of ours: the report is written all the same
+        traceback.print_exc()
+        record.fail(FAILED, f"{type(error).__name__}: {error}")
+    _finish(args, record)
+    return record
+
+
+def _finish(args, record):
+    record.begin(None)
+    try:
+        _keep(args, record)
+    except FileError as error:
+        if record.exit_code in (OK, PARTIAL):  # else there is something worse to tell
+            record.fail(PARTIAL if record.files else FAILED, error)
+
+
+def _run(args, record, progress):
+    record.input, record.output = str(args.input), str(args.output) if args.output else None
+    record.strict = bool(args.strict)
+    _check_paths(args)
     try:
         settings, options = (_made_from(args, kind) for kind in (Settings, MeshOptions))
         settings.check_together()
     except UnwrapError as error:
         raise UsageError(error) from None
-    try:
-        import bpy
-    except ImportError:
-        raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
-    from .addon import checking, files, outcome, preview, selection, unwrapping
+    values = dataclasses.asdict(settings) | dataclasses.asdict(options)
+    record.settings = {name: getattr(value, "item", lambda value=value: value)() for name, value in values.items()}
+    with stopping.undisturbed():
+        try:
+            import bpy
+        except ImportError:
+            raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
+        from .addon import choosing, files, preview, selection, unwrapping
+    record.blender = bpy.app.version_string
 
-    _check_files(args, files, preview)
+    _check_formats(args, files, preview)
+    _keep(args, record)  # which says that the run is not finished, in place of what an earlier one said
+    record.begin("read")
     with _at_file("read", args.input, files):
-        loaded = files.load(args.input)
-    objects = _chosen(loaded, args)
+        files.load(args.input)
+    choice = choosing.choose(args.object, args.collection)
+    record.skipped = choice.skipped
+    objects = choice.required()
+    maps = choosing.Maps(objects, args.uv_map, args.texcoord)
     _check_room(args, objects, files)
+    record.begin("unwrap")
     files.prepare(objects, weld=args.weld, seams_from_islands=args.seams_from_islands)
     targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
+    targets = choice.narrowed(targets, args.material)
+    objects = choice.required()
+    maps.make_missing(objects)
     with files.quiet():
-        outcomes = finished(unwrapping.unwrap_targets(targets, settings, options, bpy.context))
-    if not outcomes:
-        raise FileError(f"{', '.join(obj.name for obj in objects)}: there are no visible faces")
+        steps = unwrapping.unwrap_targets(targets, settings, options, bpy.context)
+        outcomes = finished(mapped(progress, steps) if progress else steps)
+    record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
+    record.begin("write")
+    if record.done:
+        _write(args, record, maps, targets)
+    record.judge()
 
-    done = [outcome for outcome in outcomes if not outcome.error]
-    if done:
-        with writing.Staging(overwrite=args.overwrite) as staging:
-            if args.preview:
-                with _at_file("write", args.preview, files):
-                    staging.write(
-                        args.preview, lambda path: preview.render(targets, outcomes, path), checking.check_image
-                    )
-            if args.output:
-                with _at_file("write", args.output, files):
-                    files.stage(staging, args.output)
+
+def _write(args, record, maps, targets):
+    from .addon import checking, files, preview
+
+    named = {outcome.obj for outcome in record.done}
+    done = {target.obj for target in targets if target.obj.name in named}
+    with writing.Staging(overwrite=args.overwrite) as staging:
+        if args.preview:
+            with _at_file("write", args.preview, files):
+                staging.write(
+                    args.preview, lambda path: preview.render(targets, record.outcomes, path), checking.check_image
+                )
+        if args.output:
+            if args.output.suffix.lower() not in files.ONE_MAP:  # of which the active one is that with the new UVs
+                maps.restore(done)
+            with _at_file("write", args.output, files):
+                files.stage(staging, args.output)
+        try:
             with _at_file("write", args.output or args.preview, files):
                 staging.put_in_place()
-    if args.json:
-        with _at_file("write", args.json, files), writing.Staging(overwrite=True) as staging:
-            document = _document(args, settings, options, outcomes, bpy.app.version_string)
-            staging.write_text(args.json, json.dumps(document, indent=2) + "\n")
+        finally:
+            record.files = staging.placed
+
+
+def _keep(args, record):
+    """Write the report, if one is wanted and nothing is in its way but a report of the same run."""
+    if not args.json or str(args.json) == "-":
+        return
+    if not record.is_kept and args.json.exists() and not (args.overwrite and args.json.is_file()):
+        return
+    text = json.dumps(record.to_dict(), indent=2) + "\n"
+    try:
+        with writing.Staging(overwrite=True) as staging:
+            staging.write_text(args.json, text)
             staging.put_in_place()
-    _print_table(outcomes, outcome)
-    return (0 if len(done) == len(outcomes) else 1) if done else 3
+    except (OSError, FileError) as error:
+        raise FileError(f"cannot write {args.json}: {error}") from error
+    record.is_kept = True
+
+
+def _show(args, record):
+    if str(args.json) == "-":
+        console.show(json.dumps(record.to_dict(), indent=2))
+    else:
+        told = record.outcomes if record.exit_code in (OK, PARTIAL) or not record.done else []
+        console.show_outcomes(told, record.skipped_sentences(), verbose=args.verbose, quiet=args.quiet)
+    if record.error:
+        console.show(f"qh-unwrap: error: {record.error}", error=True)
 
 
 @contextmanager
@@ -162,34 +364,32 @@ def _made_from(args, kind):
     return kind(**{field.name: getattr(args, field.name) for field in dataclasses.fields(kind)})
 
 
-def _check_files(args, files, preview):
+def _check_paths(args):
+    """Raise `UsageError` where the files cannot be meant, before anything is written, the report included."""
     if args.input != "suzanne":
         args.input = Path(args.input)
+        if args.json and _is_same(args.json, args.input):
+            args.json = None
+            raise UsageError(f"--json would replace the input {args.input}: choose another name")
         if not args.input.is_file():
             raise UsageError(f"there is no file {args.input}")
-        if args.input.suffix.lower() not in files.READERS:
-            raise UsageError(f"cannot read {args.input}: use {', '.join(files.READERS)}")
-    if args.output and args.output.suffix.lower() not in files.WRITERS:
-        raise UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(files.WRITERS)}")
-    if args.preview and args.preview.suffix.lower() not in preview.FORMATS:
-        raise UsageError(f"cannot write {args.preview}: pictures can be {', '.join(preview.FORMATS)}")
-    paths = list(filter(None, (args.output, _sibling(args.output), args.json, args.preview)))
-    for path in paths:
+    report = args.json if str(args.json) != "-" else None
+    places = {}
+    for path in filter(None, (args.output, _sibling(args.output), report, args.preview)):
+        place = os.path.realpath(path)
+        if place in places:
+            args.json = None
+            raise UsageError(f"{path} is asked for twice: choose another name")
+        places[place] = path
+    for path in places.values():
         if not path.absolute().parent.is_dir():
             raise UsageError(f"there is no folder {path.absolute().parent}")
+        if path.exists() and not path.is_file():
+            raise UsageError(f"{path} is a folder, or no file to write to")
         if path.exists() and not args.overwrite:
             raise UsageError(f"{path} exists: choose another name, or pass --overwrite")
-        if os.path.lexists(path) and not path.is_file():
-            raise UsageError(f"{path} is a folder, or no file to write to")
-    for path in paths:
+    for path in places.values():
         writing.check_folder(path)
-
-
-def _check_room(args, objects, files):
-    sizes = {args.preview: 100_000} if args.preview else {}
-    if args.output:
-        sizes[args.output] = files.likely_size(args.output, args.input, objects)
-    writing.check_room(sizes)
 
 
 def _sibling(path):
@@ -198,48 +398,19 @@ def _sibling(path):
     return path.with_suffix(suffix) if suffix else None
 
 
-def _chosen(objects, args):
-    if not objects:
-        raise FileError(f"there is no mesh in {args.input}")
-    present = [obj.name for obj in objects]
-    unknown = set(args.object or ()) - set(present)
-    if unknown:
-        raise UsageError(f"there is no mesh object {', '.join(sorted(unknown))}: the file has {', '.join(present)}")
-    return [obj for obj in objects if not args.object or obj.name in args.object]
+def _check_formats(args, files, preview):
+    if args.input != "suzanne" and args.input.suffix.lower() not in files.READERS:
+        raise UsageError(f"cannot read {args.input}: use {', '.join(files.READERS)}")
+    if args.output and args.output.suffix.lower() not in files.WRITERS:
+        raise UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(files.WRITERS)}")
+    if args.preview and args.preview.suffix.lower() not in preview.FORMATS:
+        raise UsageError(f"cannot write {args.preview}: pictures can be {', '.join(preview.FORMATS)}")
+    if args.texcoord is not None and not (isinstance(args.texcoord, int) and args.texcoord >= 0):
+        raise UsageError(f"--texcoord is {args.texcoord!r}: choose a whole number from 0")
 
 
-def _print_table(outcomes, words):
-    """Print a row for each island, a line for each kind of message, and to stderr one for each kind of error."""
-    head = ("island", "faces", "stretch", "sym. Dirichlet", "angle", "area", "flips", "iterations")
-    rows = [_row(outcome, words.change) for outcome in outcomes if not outcome.error]
-    widths = [max(len(row[column]) for row in (head, *rows)) for column in range(len(head))]
-    for row in (head, *rows) if rows else ():
-        first, *others = (text.rjust(width) for text, width in zip(row, widths, strict=True))
-        print("  ".join((first.strip().ljust(widths[0]), *others)))
-    for sentence in words.sentences(outcomes):
-        print(sentence)
-    for sentence in words.error_sentences(outcomes):
-        print(sentence, file=sys.stderr)
-
-
-def _row(outcome, change):
-    return (
-        f"{outcome.obj} {outcome.number}",
-        str(outcome.faces),
-        *(
-            change(outcome.before, outcome.after, name)
-            for name in ("l2_stretch", "symmetric_dirichlet", "angle", "area")
-        ),
-        str(outcome.after.flips),
-        str(outcome.iterations),
-    )
-
-
-def _document(args, settings, options, outcomes, blender_version):
-    return dict(
-        versions=dict(qh_unwrap=__version__, blender=blender_version),
-        input=str(args.input),
-        output=str(args.output) if args.output else None,
-        settings=dataclasses.asdict(settings) | dataclasses.asdict(options),
-        islands=[outcome.to_dict() for outcome in outcomes],
-    )
+def _check_room(args, objects, files):
+    sizes = {args.preview: 100_000} if args.preview else {}
+    if args.output:
+        sizes[args.output] = files.likely_size(args.output, args.input, objects)
+    writing.check_room(sizes)

@@ -9,6 +9,8 @@ import numpy as np
 from ..core import Distortion
 from ..core.overlaps import ENOUGH
 
+_NAMES = 5  # that are told; further ones are counted
+
 
 @dataclass
 class Outcome:
@@ -194,6 +196,25 @@ def change(before, after, name):
     """One measure of a `Distortion` before, if there was one, and after: "1.310 → 1.090"."""
     new = _shown(getattr(after, name))
     return f"{_shown(getattr(before, name))} → {new}" if before else new
+
+
+def mean_change(outcomes, name):
+    """The same of several that are done, in the mean over their surface; without "before" where one has none."""
+    after = _shown(_mean(outcomes, [getattr(outcome.after, name) for outcome in outcomes]))
+    if not all(outcome.before for outcome in outcomes):
+        return after
+    return f"{_shown(_mean(outcomes, [getattr(outcome.before, name) for outcome in outcomes]))} → {after}"
+
+
+def told_of(reason, names):
+    """What there is to say of objects: "2 objects without faces: Cube, Plane"."""
+    return f"{count(len(names), 'object')} {reason}: {listed(names)}"
+
+
+def listed(names):
+    """The first of the names, and how many others there are."""
+    more = len(names) - _NAMES
+    return ", ".join(names[:_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def count(number, noun):

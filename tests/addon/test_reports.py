@@ -102,7 +102,7 @@ def test_command_line_says_when_nothing_is_visible(tmp_path, capfd):
     obj.data.polygons.foreach_set("hide", np.ones(9, dtype=bool))
     files.save(tmp_path / "in.blend")
     assert cli.main([str(tmp_path / "in.blend")]) == 3
-    assert "Grid: there are no visible faces" in capfd.readouterr().err
+    assert "there is nothing to unwrap: 1 object without visible faces: Grid" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
