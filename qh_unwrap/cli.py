@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from . import __version__, console
-from .addon import stopping, writing
+from .addon import stopping, streams, writing
 from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
 from .addon.failures import FileError, UsageError
 from .addon.options import MeshOptions
@@ -261,7 +261,7 @@ def _run(args, record, progress):
         raise UsageError(error) from None
     values = dataclasses.asdict(settings) | dataclasses.asdict(options)
     record.settings = {name: getattr(value, "item", lambda value=value: value)() for name, value in values.items()}
-    with stopping.undisturbed():
+    with stopping.undisturbed(), streams.quiet():
         try:
             import bpy
         except ImportError:
@@ -272,7 +272,7 @@ def _run(args, record, progress):
     _check_formats(args, files, preview)
     _keep(args, record)  # which says that the run is not finished, in place of what an earlier one said
     record.begin("read")
-    with _at_file("read", args.input, files):
+    with _at_file("read", args.input):
         files.load(args.input)
     choice = choosing.choose(args.object, args.collection)
     record.skipped = choice.skipped
@@ -285,7 +285,7 @@ def _run(args, record, progress):
     targets = choice.narrowed(targets, args.material)
     objects = choice.required()
     maps.make_missing(objects)
-    with files.quiet():
+    with streams.quiet():
         steps = unwrapping.unwrap_targets(targets, settings, options, bpy.context)
         outcomes = finished(mapped(progress, steps) if progress else steps)
     record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
@@ -302,17 +302,17 @@ def _write(args, record, maps, targets):
     done = {target.obj for target in targets if target.obj.name in named}
     with writing.Staging(overwrite=args.overwrite) as staging:
         if args.preview:
-            with _at_file("write", args.preview, files):
+            with _at_file("write", args.preview):
                 staging.write(
                     args.preview, lambda path: preview.render(targets, record.outcomes, path), checking.check_image
                 )
         if args.output:
             if args.output.suffix.lower() not in files.ONE_MAP:  # of which the active one is that with the new UVs
                 maps.restore(done)
-            with _at_file("write", args.output, files):
+            with _at_file("write", args.output):
                 files.stage(staging, args.output)
         try:
-            with _at_file("write", args.output or args.preview, files):
+            with _at_file("write", args.output or args.preview):
                 staging.put_in_place()
         finally:
             record.files = staging.placed
@@ -345,9 +345,9 @@ def _show(args, record):
 
 
 @contextmanager
-def _at_file(verb, path, files):
+def _at_file(verb, path):
     try:
-        with files.quiet(errors=True):
+        with streams.quiet(errors=True):
             yield
     except (RuntimeError, OSError, FileError) as error:
         stopping.check()

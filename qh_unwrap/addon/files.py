@@ -1,19 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mesh files in and out for the command line, by Blender's own importers and exporters."""
 
-import ctypes
-import os
-import sys
-import tempfile
-from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
-from functools import cache
-
 import bmesh
 import bpy
 import numpy as np
 
 from ..core.islands import cuts
-from . import checking, mesh_arrays, selection, stopping, suzanne, writing
+from . import checking, mesh_arrays, selection, suzanne, writing
 from .failures import FileError
 
 
@@ -143,55 +136,3 @@ def likely_size(path, source, objects):
     vertices = sum(len(obj.data.vertices) for obj in objects)
     same_kind = source != "suzanne" and source.suffix.lower() == path.suffix.lower()
     return max(10 * vertices + 8 * corners, source.stat().st_size * 3 // 4 if same_kind else 0)
-
-
-@contextmanager
-def quiet(errors=False):
-    """Keep what Blender prints from the standard output, which is for the table alone.
-
-    errors   keep it from the standard error as well if an exception comes, which says it better; else it follows later
-    """
-    open_standard_streams()
-    library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)  # Blender prints through a buffer of C, too
-    with ExitStack() as stack:
-        nowhere = stack.enter_context(open(os.devnull, "w"))
-        later = stack.enter_context(tempfile.TemporaryFile("w+", errors="replace")) if errors else None
-        with _redirected(library, 1, nowhere), redirect_stdout(nowhere):
-            if later is None:
-                yield
-                return
-            with _redirected(library, 2, later), redirect_stderr(_stream_2()):
-                yield
-        later.seek(0)
-        if sys.stderr is not None:
-            sys.stderr.write(later.read())
-
-
-@cache
-def _stream_2():
-    """Python's way to stream 2, wherever that leads.  It stays open, since loggers of Blender's exporters keep it."""
-    return open(2, "w", buffering=1, errors="backslashreplace", closefd=False)
-
-
-def open_standard_streams():
-    """Lead the standard streams that are closed to nowhere, lest a file that is opened later takes the place of one."""
-    while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
-        pass
-    os.close(handle)
-
-
-@contextmanager
-def _redirected(library, number, file):
-    """Lead stream 1 or 2 to a file."""
-    with stopping.undisturbed():
-        library.fflush(None)
-        saved = os.dup(number)
-        os.dup2(file.fileno(), number)
-    try:
-        yield
-    finally:
-        stopping.hold()
-        library.fflush(None)
-        os.dup2(saved, number)
-        os.close(saved)
-        stopping.release()

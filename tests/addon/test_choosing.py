@@ -37,12 +37,7 @@ def test_objects_by_patterns(run):
     for name in ("Wall.L", "Wall.R", "Floor", "Part[1]"):
         add_grid(2, name)
     assert unwrapped(run("--object", "Wall.?")[1]) == ["Wall.L", "Wall.R"]
-    files.load((bpy.data.filepath and None) or "suzanne")
-    for name in ("Wall.L", "Part[1]"):
-        add_grid(2, name)
-    assert unwrapped(run("--object", "Part[1]", "--object", "Suz*")[1]) == ["Suzanne"] * 5 + ["Part[1]"], (
-        "to the letter"
-    )
+    assert unwrapped(run("--object", "Part[1]", "--object", "F*")[1]) == ["Floor", "Part[1]"], "to the letter"
 
 
 def test_collections(run):
@@ -151,12 +146,12 @@ def state(obj):
 
 @pytest.mark.parametrize("arguments", [("--uv-map", "Light"), ("--texcoord", "1")])
 @pytest.mark.parametrize("is_there", [False, True])
-def test_another_map(run, arguments, is_there, tmp_path):
+def test_another_map(run, arguments, is_there):
     obj = add_grid(4)
     if is_there:
         obj.data.uv_layers.new(name="Light")
     before, active = uvs(obj, "UVMap"), state(obj)
-    code, report = run(*arguments, "--placement", "unit", "--preview", str(tmp_path / "p.png"))
+    code, report = run(*arguments, "--placement", "unit")
     assert code == 0
     (obj,) = bpy.context.scene.objects
     first, second = obj.data.uv_layers.keys()
@@ -178,7 +173,7 @@ def test_formats_with_one_map_get_the_new_one(run, suffix):
     add_grid(4)
     assert run("--uv-map", "Light", "--placement", "unit", suffix=suffix)[0] == 0
     (obj,) = bpy.context.scene.objects
-    assert np.ptp(uvs(obj), axis=0).min() < 0.99, "the old one is the whole square"
+    assert np.ptp(uvs(obj), axis=0).min() < 0.995, "the old one is the whole square"
 
 
 def test_a_new_map_is_not_left_where_all_failed(run):
@@ -195,11 +190,11 @@ def test_a_new_map_is_not_left_where_all_failed(run):
         (("--texcoord", "3"), "Grid has 1 UV map: --texcoord can be 1 at most"),
         (("--texcoord", "-1"), "--texcoord is -1"),
         (("--uv-map", ""), "the UV map has no name"),
-        (("--uv-map", "x" * 300), "cannot have a UV map xxx"),
+        (("--uv-map", "Dirt"), "cannot have a UV map Dirt"),
         (("--uv-map", "a", "--texcoord", "1"), "not allowed with"),
     ],
 )
 def test_maps_that_cannot_be(run, arguments, message):
-    add_grid(2)
+    add_grid(2).data.color_attributes.new("Dirt", 'FLOAT_COLOR', 'POINT')
     code, report = run(*arguments)
     assert code == 2 and message in report["error"]
