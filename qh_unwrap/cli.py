@@ -338,8 +338,10 @@ def _show(args, record):
     if str(args.json) == "-":
         console.show(json.dumps(record.to_dict(), indent=2))
     else:
-        told = record.outcomes if record.exit_code in (OK, PARTIAL) or not record.done else []
-        console.show_outcomes(told, record.skipped_sentences(), verbose=args.verbose, quiet=args.quiet)
+        is_written = record.exit_code in (OK, PARTIAL)
+        told = record.outcomes if is_written or not record.done else []
+        skipped = record.skipped_sentences() if is_written else []
+        console.show_outcomes(told, skipped, verbose=args.verbose, quiet=args.quiet)
     if record.error:
         console.show(f"qh-unwrap: error: {record.error}", error=True)
 

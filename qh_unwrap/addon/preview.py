@@ -39,8 +39,8 @@ def render(targets, outcomes, path):
 
 
 def _as_template(path):
-    """The path as Blender wants it for pictures: from version 5 on, braces have a meaning there."""
-    return str(path).replace("{", "{{").replace("}", "}}") if bpy.app.version >= (5, 0, 0) else str(path)
+    """The path as Blender wants it for pictures: from version 4.5 on, braces have a meaning there."""
+    return str(path).replace("{", "{{").replace("}", "}}") if bpy.app.version >= (4, 5, 0) else str(path)
 
 
 _KINDS = (

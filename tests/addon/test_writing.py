@@ -73,7 +73,7 @@ def test_full_disk_leaves_the_old_files(source, folder, suffix, capfd):
 def test_full_disk_leaves_the_old_preview_and_output(source, folder, suffix, monkeypatch, capfd):
     monkeypatch.setattr(preview, "_WIDTH", 200)
     monkeypatch.setattr(preview, "_HEIGHT", 100)
-    target, picture = folder / "out.obj", folder / f"picture{suffix}"
+    target, picture = folder / "out.obj", folder / f"picture{{x}}##{suffix}"
     target.write_text("old")
     picture.write_text("old")
     before = contents(folder)
