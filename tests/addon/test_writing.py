@@ -153,6 +153,21 @@ def test_the_files_are_replaced_all_or_none(folder):
     assert contents(folder) == before
 
 
+def test_files_and_folders_are_synced_before_and_after_the_exchange(folder, monkeypatch):
+    done = []
+    fsync, replace = os.fsync, os.replace
+
+    def sync(handle):
+        done.append("folder" if stat.S_ISDIR(os.fstat(handle).st_mode) else "file")
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    monkeypatch.setattr(os, "replace", lambda *paths: done.append("replace") or replace(*paths))
+    add_grid(2)
+    files.save(folder / "a.obj")
+    assert done == ["file", "file", "replace", "replace", "folder"]
+
+
 def test_symbolic_links_stay_and_modes_are_kept(source, folder):
     real, link = folder / "real" / "model.obj", folder / "out.obj"
     real.parent.mkdir()
