@@ -43,7 +43,7 @@ def unwrap_file(path, output=None, **options):
 
     Returns the dictionary that `--json` writes.  Its `exit_code` is 0 if all is well, 1 if some islands failed, and 3,
     with the reason in `error`, if nothing could be written: none of that raises anything.  Raises `UsageError`, a
-    `ValueError`, for what the command line would call wrong usage; then nothing was read or written.
+    `ValueError`, for what the command line would call wrong usage; then nothing was written.
     """
     from . import cli
 

@@ -353,7 +353,8 @@ def _at_file(verb, path):
             yield
     except (RuntimeError, OSError, FileError) as error:
         stopping.check()
-        raise FileError(f"cannot {verb} {path}: {_reason(error)}") from error
+        is_full = verb == "write" and writing.is_full(path)  # which Blender does not always say
+        raise FileError(f"cannot {verb} {path}: {_reason(error)}{' (the disk is full)' if is_full else ''}") from error
 
 
 def _reason(error):

@@ -3,7 +3,7 @@
 
 
 class UsageError(ValueError):
-    """What was asked for cannot be meant: nothing was read or written, and the message says what to change."""
+    """What was asked for cannot be meant: nothing was written, and the message says what to change."""
 
 
 class FileError(Exception):

@@ -13,6 +13,7 @@ from . import stopping
 from .failures import FileError
 
 _PREFIX = ".qh-unwrap-"
+_LEAST = 1 << 14  # bytes: a disk with less is full
 
 
 class _Waiting(NamedTuple):
@@ -158,6 +159,11 @@ def check_room(sizes):
         if size > free:
             room = f"about {_megabytes(size)} are needed, and {_megabytes(free)} are free"
             raise FileError(f"cannot write to the folder {folder}: {room}")
+
+
+def is_full(path):
+    """Whether nothing more fits where `path` is."""
+    return shutil.disk_usage(Path(os.path.realpath(path)).parent).free < _LEAST
 
 
 def _megabytes(size):

@@ -202,6 +202,16 @@ def test_room_is_looked_at_before_the_work(source, folder, capfd, monkeypatch):
     assert "are needed, and 0.0 MB are free" in capfd.readouterr().err
 
 
+def test_full_disk_is_named_where_blender_says_something_else(source, folder, capfd, monkeypatch):
+    def fail(filepath):
+        monkeypatch.setattr(writing.shutil, "disk_usage", lambda folder: type("Usage", (), {"free": 0}))
+        raise RuntimeError("Error: No such file or directory")
+
+    monkeypatch.setitem(files.WRITERS, ".blend", fail)
+    assert main([str(source), "-o", str(folder / "out.blend")]) == 3
+    assert "No such file or directory (the disk is full)" in capfd.readouterr().err
+
+
 def test_folder_that_takes_no_files_is_found_before_the_work(source, folder, capfd, monkeypatch):
     def refuse(dir):
         raise OSError(errno.EROFS, "Read-only file system")
