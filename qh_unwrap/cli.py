@@ -285,9 +285,15 @@ def _run(args, record, progress):
     targets = choice.narrowed(targets, args.material)
     objects = choice.required()
     maps.make_missing(objects)
+
+    def step(share):
+        stopping.check()
+        if progress:
+            progress(share)
+
     with streams.quiet():
         steps = unwrapping.unwrap_targets(targets, settings, options, bpy.context)
-        outcomes = finished(mapped(progress, steps) if progress else steps)
+        outcomes = finished(mapped(step, steps))
     record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
     record.begin("write")
     if record.done:

@@ -32,6 +32,7 @@ def quiet(errors=False):
                 return
             with _redirected(library, 2, later), redirect_stderr(_stream_2()):
                 yield
+        stopping.check()  # what Blender may have printed as an error of a handler
         later.seek(0)
         with suppress(OSError, ValueError):  # of a stream that is closed
             for line in later:

@@ -222,6 +222,15 @@ def test_folder_that_takes_no_files_is_found_before_the_work(source, folder, cap
     assert f"cannot write to the folder {folder}: Read-only file system" in capfd.readouterr().err
 
 
+def test_signal_that_a_handler_of_blender_swallows(source, folder, capfd):
+    def stop(*_):
+        signal.raise_signal(signal.SIGTERM)
+
+    bpy.app.handlers.load_pre.append(stop)  # which Blender forgets when it has loaded the file
+    assert main([str(source), "-o", str(folder / "out.obj")]) == 143
+    assert capfd.readouterr().err == "qh-unwrap: error: stopped by SIGTERM\n" and not contents(folder)
+
+
 @pytest.mark.parametrize("when", ["read", "unwrap", "write", "put in place"])
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_signals_leave_nothing(source, folder, capfd, monkeypatch, when, number, code):
