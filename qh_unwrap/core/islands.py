@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from .doubles import find_doubles
-from .pieces import components, first_and_last
+from .pieces import around_faces, components, first_and_last
 from .winding import agreed
 
 _SMALL = 1e-4  # of an edge's length in the map, up to which a gap there is none
@@ -60,7 +60,7 @@ def find_islands(
     Faces are neighbours across an edge that is no seam and that exactly two selected faces use; doubled ones do not
     count.
     """
-    corner_face, following = _around_faces(face_start, len(corner_vertex))
+    corner_face, following = around_faces(face_start, len(corner_vertex))
     doubles = find_doubles(corner_vertex, corner_edge, face_start, seam, selected)
     is_double = doubles.among(len(face_start))
     single, doubled = selected & ~is_double, selected & is_double
@@ -178,14 +178,14 @@ def attached(
     following, (one, start, end) = _neighbours(corner_vertex, corner_edge, face_start, seam, selected)
     joined = _meet(uv, one, start, end, following)
     uv_vertex = _uv_vertices(one[joined], start[joined], end[joined], following)
-    is_selected = selected[_around_faces(face_start, len(corner_vertex))[0]]
+    is_selected = selected[around_faces(face_start, len(corner_vertex))[0]]
     unselected_there = np.bincount(uv_vertex, weights=~is_selected) > 0
     return is_selected & unselected_there[uv_vertex]
 
 
 def _neighbours(corner_vertex, corner_edge, face_start, seam, selected):
     """The corner that follows each around its face, and what `_across_edges` returns of all faces but doubled ones."""
-    corner_face, following = _around_faces(face_start, len(corner_vertex))
+    corner_face, following = around_faces(face_start, len(corner_vertex))
     doubles = find_doubles(corner_vertex, corner_edge, face_start, seam, selected)
     corners = np.flatnonzero(~doubles.among(len(face_start))[corner_face])
     return following, _across_edges(corner_vertex, corner_edge, following, seam, corners)[:3]
@@ -205,15 +205,6 @@ def _meet(uv, one, start, end, following):
         size = np.abs(np.hstack([here, there])).max(axis=(1, 2))
         meet[different] = np.abs(here - there).max(axis=(1, 2)) <= _SMALL * length + _ROUNDING * size
     return meet
-
-
-def _around_faces(face_start, corner_count):
-    """The face of each corner, and the corner that follows it around that face."""
-    face_end = np.append(face_start[1:], corner_count)
-    corner_face = np.repeat(np.arange(len(face_start)), face_end - face_start)
-    following = np.arange(1, corner_count + 1)
-    following[face_end - 1] = face_start
-    return corner_face, following
 
 
 def _across_edges(corner_vertex, corner_edge, following, seam, corners):

@@ -18,6 +18,18 @@ def numbers(starts: np.ndarray, count: int) -> np.ndarray:
     return np.repeat(np.arange(len(starts)), np.diff(starts, append=count))
 
 
+def around_faces(face_start: np.ndarray, corner_count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The face of each corner, (c,), and the corner that follows it around that face, (c,).
+
+    The corners of each face begin at its place in `face_start` (f,).
+    """
+    face_end = np.append(face_start[1:], corner_count)
+    corner_face = numbers(face_start, corner_count)
+    following = np.arange(1, corner_count + 1)
+    following[face_end - 1] = face_start
+    return corner_face, following
+
+
 def first_and_last(items: np.ndarray, place: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """The first and the last item at each of `count` places, (count,) each; anything at a place that has none.
 
