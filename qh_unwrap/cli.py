@@ -55,7 +55,7 @@ _NEEDS = {  # what each flag counts with, where its description does not say so
     "margin": "only where islands are packed",
     "rotate": "only with --placement PACK",
 }
-
+_SPLIT = (".glb", ".gltf", ".stl", ".ply")  # what has its vertices split, or each face for itself
 
 _command = None
 
@@ -141,7 +141,6 @@ def _parser():
     parser.add_argument("input", metavar="INPUT", help=_INPUT)
     parser.add_argument("-o", "--output", type=Path, help="file to write, in any of these formats except .stl")
     parser.add_argument("--object", action="append", metavar="NAME", help="unwrap this object only; may be repeated")
-    parser.add_argument("--weld", action="store_true", help="first join vertices that lie at the same place")
     parser.add_argument("--seams-from-islands", action="store_true", help="first mark the cuts of the old UVs as seams")
     parser.add_argument(
         "--collection",
@@ -181,6 +180,8 @@ def _parser():
 
 
 def _argument(field):
+    if field.name == "weld":
+        return dict(action=argparse.BooleanOptionalAction, default=None)
     if type(field.default) is bool:
         return dict(action=argparse.BooleanOptionalAction, default=field.default)
     if field.metadata["choices"]:
@@ -192,7 +193,9 @@ def _argument(field):
 def _help(field):
     meta, default = field.metadata, field.default
     notes = [_NEEDS[field.name]] if field.name in _NEEDS else []
-    if type(default) is bool:
+    if field.name == "weld":
+        notes.append(f"on if not given for {', '.join(_SPLIT)}, off for others")
+    elif type(default) is bool:
         notes.append(f"default {'on' if default else 'off'}")
     elif meta["choices"]:
         notes.append(f"default {default}")
@@ -254,6 +257,8 @@ def _run(args, record, progress):
     record.input, record.output = str(args.input), str(args.output) if args.output else None
     record.strict = bool(args.strict)
     _check_paths(args)
+    if args.weld is None:
+        args.weld = Path(args.input).suffix.lower() in _SPLIT
     try:
         settings, options = (_made_from(args, kind) for kind in (Settings, MeshOptions))
         settings.check_together()
@@ -280,7 +285,8 @@ def _run(args, record, progress):
     maps = choosing.Maps(objects, args.uv_map, args.texcoord)
     _check_room(args, objects, files)
     record.begin("unwrap")
-    files.prepare(objects, weld=args.weld, seams_from_islands=args.seams_from_islands)
+    if args.seams_from_islands:
+        files.mark_cuts(objects, options)
     targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
     targets = choice.narrowed(targets, args.material)
     objects = choice.required()
@@ -297,21 +303,23 @@ def _run(args, record, progress):
     record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
     record.begin("write")
     if record.done:
-        _write(args, record, maps, targets)
+        _write(args, record, maps, targets, options)
     record.judge()
 
 
-def _write(args, record, maps, targets):
+def _write(args, record, maps, targets, options):
     from .addon import checking, files, preview
 
     named = {outcome.obj for outcome in record.done}
     done = {target.obj for target in targets if target.obj.name in named}
+
+    def draw(path):
+        preview.render(targets, record.outcomes, options, path)
+
     with writing.Staging(overwrite=args.overwrite) as staging:
         if args.preview:
             with _at_file("write", args.preview):
-                staging.write(
-                    args.preview, lambda path: preview.render(targets, record.outcomes, path), checking.check_image
-                )
+                staging.write(args.preview, draw, checking.check_image)
         if args.output:
             if args.output.suffix.lower() not in files.ONE_MAP:  # of which the active one is that with the new UVs
                 maps.restore(done)

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mesh files in and out for the command line, by Blender's own importers and exporters."""
 
-import bmesh
 import bpy
-import numpy as np
 
 from ..core.islands import cuts
 from . import checking, mesh_arrays, selection, suzanne, writing
@@ -26,7 +24,7 @@ def _new_scene():
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
 
 
-_gltf = _importer(bpy.ops.import_scene.gltf, merge_vertices=True)
+_gltf = _importer(bpy.ops.import_scene.gltf)
 _usd = _importer(bpy.ops.wm.usd_import)
 
 READERS = {
@@ -75,29 +73,13 @@ def load(source):
     return [obj for obj in selection.distinct_meshes(bpy.context.scene.objects) if obj.data.polygons]
 
 
-def prepare(objects, *, weld, seams_from_islands):
-    """Join vertices that formats like glTF split, and mark the cuts of the UVs as seams."""
+def mark_cuts(objects, options):
+    """Mark the cuts of the UVs as seams, where edges are welded all of them."""
     for obj in objects:
-        if weld:
-            _weld(obj.data)
-        if seams_from_islands:
-            _mark_cuts(obj)
-
-
-def _weld(mesh):
-    bm = bmesh.new()
-    bm.from_mesh(mesh)
-    size = np.ptp([vertex.co for vertex in bm.verts], axis=0).max()
-    bmesh.ops.remove_doubles(bm, verts=bm.verts, dist=1e-6 * size)
-    bm.to_mesh(mesh)
-    bm.free()
-
-
-def _mark_cuts(obj):
-    mesh = mesh_arrays.read(obj)
-    if mesh.uv is not None:
-        cut = cuts(mesh.corner_vertex, mesh.corner_edge, mesh.face_start, len(mesh.seam), mesh.uv)
-        obj.data.edges.foreach_set("use_seam", mesh.seam | cut)
+        mesh = mesh_arrays.read(obj, options)
+        if mesh.uv is not None:
+            seam = mesh.seam | cuts(mesh.corner_vertex, mesh.corner_edge, mesh.face_start, len(mesh.seam), mesh.uv)
+            obj.data.edges.foreach_set("use_seam", seam if mesh.welded_edge is None else seam[mesh.welded_edge])
 
 
 def save(path):

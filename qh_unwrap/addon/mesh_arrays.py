@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..core import UnwrapError
+from ..core.welding import find_welds
 from .options import MeshOptions
 from .shown_shape import shown_vertices
 
@@ -17,16 +18,17 @@ from .shown_shape import shown_vertices
 class MeshArrays:
     vertices: np.ndarray  # (n, 3) float64, as the object shows them, but for its location
     up: np.ndarray  # (3,) the object's up axis in the same space
-    corner_vertex: np.ndarray  # (c,)
-    corner_edge: np.ndarray  # (c,)
+    corner_vertex: np.ndarray  # (c,) where vertices are welded, the first of them
+    corner_edge: np.ndarray  # (c,) and so with edges
     face_start: np.ndarray  # (f,) first corner of each face
-    seam: np.ndarray  # (e,) bool
+    seam: np.ndarray  # (e,) bool, of those that are welded all or none
     corner_triangles: np.ndarray  # (t, 3) corners
     uv: np.ndarray | None  # (c, 2) float64
     pinned: np.ndarray  # (c,) bool
     aspect: np.ndarray  # (f,) width by height of the image on each face
     slot: np.ndarray  # (f,) the number of each face's material among the images
     images: tuple[str, ...]  # what each of the materials shows, the same for what shares its UVs
+    welded_edge: np.ndarray | None = None  # (e,) the edge that each counts as, None if nothing shall be welded
 
     @cached_property
     def one_aspect(self):
@@ -103,20 +105,42 @@ def _read(obj, mesh, uv_name, options):
         if pins is not None:
             pinned = _get(pins.data, "value", bool)
     slot, images, aspects = _images(obj, mesh)
+    corner_vertex = _of_corners(mesh, ".corner_vert", "vertex_index")
+    corner_edge = _of_corners(mesh, ".corner_edge", "edge_index")
+    face_start = _get(mesh.polygons, "loop_start", np.int32)
+    seam, welded_edge = _get(mesh.edges, "use_seam", bool), None
+    if options.weld:
+        unsmoothed = shown_vertices(obj, mesh, False) if options.use_subsurf_data else vertices
+        welds = find_welds(_shapes(obj, unsmoothed), corner_vertex, corner_edge, face_start, len(seam))
+        corner_vertex, corner_edge, welded_edge = welds.vertex[corner_vertex], welds.edge[corner_edge], welds.edge
+        seam = (np.bincount(welded_edge, seam, len(seam)) > 0)[welded_edge]
     return MeshArrays(
         vertices=vertices.astype(np.float64) @ shown.T,
         up=shown[:, 2] / (np.linalg.norm(shown[:, 2]) or 1.0),
-        corner_vertex=_of_corners(mesh, ".corner_vert", "vertex_index"),
-        corner_edge=_of_corners(mesh, ".corner_edge", "edge_index"),
-        face_start=_get(mesh.polygons, "loop_start", np.int32),
-        seam=_get(mesh.edges, "use_seam", bool),
+        corner_vertex=corner_vertex,
+        corner_edge=corner_edge,
+        face_start=face_start,
+        seam=seam,
         corner_triangles=_corner_triangles(mesh),
         uv=uv,
         pinned=pinned,
         aspect=aspects[slot] if options.correct_aspect else np.ones(len(mesh.polygons)),
         slot=slot,
         images=images,
+        welded_edge=welded_edge,
     )
+
+
+def _shapes(obj, shown):
+    """Yield every shape that the mesh can take, (n, 3) each: that of each of its keys, and their mix that is shown.
+
+    The mix may part what every key has at one place, since a vertex group can let a key act on some vertices only.  In
+    Edit Mode the keys are up to date once the mix is known.
+    """
+    keys = obj.data.shape_keys
+    for key in keys.key_blocks if keys else ():
+        yield _get(key.data, "co", np.float32, 3)
+    yield shown
 
 
 def _get(collection, name, dtype, width=1):

@@ -55,6 +55,12 @@ class MeshOptions:
         "Unwrap the mesh as its Subdivision Surface modifier smooths it; the modifier may stand anywhere, others do"
         " not count",
     )
+    weld: bool = setting(
+        False,
+        "Weld",
+        "Unwrap as if vertices at the same place were one, where files split them along sharp edges and the cuts of UV"
+        " maps; the mesh stays as it is. What a shape key parts is not welded, nor are the two sides of a card",
+    )
 
     def __post_init__(self):
         for field in dataclasses.fields(self):

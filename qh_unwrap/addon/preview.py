@@ -22,11 +22,11 @@ _GREY = (0.6, 0.6, 0.6)
 FORMATS = {".png": 'PNG', ".jpg": 'JPEG', ".jpeg": 'JPEG'}
 
 
-def render(targets, outcomes, path):
-    """Write the picture of what was unwrapped to a new file; what it needs in Blender is removed afterwards."""
+def render(targets, outcomes, options, path):
+    """Write a picture of what was unwrapped with these options to a new file; nothing else of it stays in Blender."""
     before = {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
     try:
-        scene = _scene(targets, outcomes)
+        scene = _scene(targets, outcomes, options)
         settings = scene.render.image_settings
         settings.file_format = FORMATS[path.suffix.lower()]
         settings.color_mode, settings.quality = 'RGB', 90
@@ -57,11 +57,11 @@ _KINDS = (
 )
 
 
-def _scene(targets, outcomes):
+def _scene(targets, outcomes, options):
     scene = bpy.data.scenes.new("QH Unwrap Preview")
     failed = {(outcome.obj, outcome.number) for outcome in outcomes if outcome.error}
     objects = [target.obj for target in targets]
-    meshes = [mesh_arrays.read(obj) for obj in objects]
+    meshes = [mesh_arrays.read(obj, options) for obj in objects]
     sheets = []  # (object, mesh, island) of every island with new UVs, the largest first
     for (obj, faces, _), mesh in zip(targets, meshes, strict=True):
         islands = find_islands(

@@ -68,7 +68,7 @@ class OperatorProperties(SettingsProperties):
 _FIRST = ('boundary', 'aspect', 'balance', 'iterations', 'weights')
 _SECTIONS = {
     "Layout": ('placement', 'rotate', 'margin_method', 'margin'),
-    "Mesh": ('fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data'),
+    "Mesh": ('fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data', 'weld'),
     "Advanced": ('initial', 'refine', 'repair', 'tolerance', 'tensor_power'),
 }
 

@@ -135,7 +135,7 @@ def _shape(work):
         uv = None
     if uv is not None and work.is_cut:
         if uses_uv:
-            text = "its UVs are cut where there is no seam: mark the cuts with UV > Seams from Islands"
+            text = f"its UVs are cut where there is no seam: {_uncut(work.mesh)}"
             raise UVError(text + (_HANGS if work.is_attached else ""))
         uv = None
     pinned = pinned if pinned.any() else None
@@ -147,6 +147,13 @@ def _without_uvs(settings):
     if settings.boundary == 'KEEP':
         return "unwrap it with another boundary than Keep first"
     return "choose another start than Current UVs" if settings.initial == 'CURRENT' else "unpin it, and unwrap it first"
+
+
+def _uncut(mesh):
+    """What to do where UVs are cut without a seam; Blender's operator does not mark cuts along welded edges."""
+    if mesh.welded_edge is not None:
+        return "mark seams along the cuts, or turn Weld off"
+    return "mark the cuts with UV > Seams from Islands"
 
 
 _HANGS = " (faces that are not selected hang on it: or select all of its island)"

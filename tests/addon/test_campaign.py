@@ -125,6 +125,7 @@ def settings(obj, dice):
         correct_aspect=dice.random() < 0.5,
         correct_scale=dice.random() < 0.5,
         use_subsurf_data=dice.random() < 0.3,
+        weld=dice.random() < 0.5,
     )
 
 

@@ -204,9 +204,9 @@ def test_weld_joins_what_stl_and_gltf_split(tmp_path):
     add_grid(4, "Flat")
     source, numbers = tmp_path / "in.glb", tmp_path / "numbers.json"
     files.save(source)
-    assert main([str(source), "--json", str(numbers)]) == 0
+    assert main([str(source), "--json", str(numbers), "--no-weld"]) == 0
     assert len(json.loads(numbers.read_text())["islands"]) > 1, "flat shading splits every edge"
-    assert main([str(source), "--json", str(numbers), "--weld", "--overwrite"]) == 0
+    assert main([str(source), "--json", str(numbers), "--overwrite"]) == 0
     assert len(json.loads(numbers.read_text())["islands"]) == 1
 
 

@@ -10,6 +10,7 @@ import pytest
 from scenes import uvs
 
 from qh_unwrap.addon import files, mesh_arrays, operators
+from qh_unwrap.addon.options import MeshOptions
 from qh_unwrap.core import placing
 from qh_unwrap.core.islands import find_islands
 
@@ -22,7 +23,7 @@ def beast():
     if not _MESHES:
         pytest.skip("QH_MESHES is not set")
     (obj,) = files.load(Path(_MESHES, "artist", "beast_quads_uv.obj"))
-    files.prepare([obj], weld=False, seams_from_islands=True)
+    files.mark_cuts([obj], MeshOptions())
     obj.data.uv_layers.remove(obj.data.uv_layers.active)
     obj.select_set(True)
     assert bpy.ops.uv.qh_unwrap() == {'FINISHED'}
