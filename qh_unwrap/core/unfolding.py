@@ -44,13 +44,13 @@ def unfolded(surface: Surface, uv: np.ndarray, held: np.ndarray, most: float) ->
     tried = surface.sums(np.where(flipped, surface.measure, 0)) <= most * surface.sums(surface.measure)
     tried &= surface.sums((flipped & ~surface.degenerate).astype(int)) <= _MOST
     tried &= surface.sums(flipped.astype(int)) > 0
+    if not tried.any():
+        return uv, done
     outline = np.zeros((len(uv), 1), bool)
     outline[np.concatenate(surface.loops)] = True
     net = _Net(surface.triangles, surface.rest * map_scale(surface, uv)[surface.piece, None, None], surface.piece)
     room = _room(surface, uv)
     for holding in (held, held | outline):
-        if not tried.any():
-            break
         opened = uv
         for rings in _RINGS:
             wrong = _flipped(surface, opened) & tried[surface.piece]
@@ -66,6 +66,8 @@ def unfolded(surface: Surface, uv: np.ndarray, held: np.ndarray, most: float) ->
         uv = np.where(sound[surface.vertex_piece, None], opened, uv)
         done |= sound
         tried &= ~sound
+        if not tried.any():
+            break
     return uv, done
 
 
