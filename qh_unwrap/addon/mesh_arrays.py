@@ -41,6 +41,10 @@ class MeshArrays:
         return np.repeat(np.arange(len(self.face_start)), np.diff(self.face_start, append=len(self.corner_vertex)))
 
     @cached_property
+    def has_pins(self):
+        return bool(self.pinned.any())
+
+    @cached_property
     def fresh(self):
         """(f,) bool, which faces have the UVs of a new map, where every face fills the square: they say nothing.
 

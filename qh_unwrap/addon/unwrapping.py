@@ -68,8 +68,10 @@ def _placed(works, options, context):
     """Put the islands where they belong, and see what they lie on there; yields the share that is done, returns those
     that have UVs now."""
     layout.place([work for work in works if work.uv is not None], works, options, context)
+    yield _UNWRAPPING
     placed = [work for work in works if work.uv is not None]
     _judge(placed)
+    yield _UNWRAPPING
     if placed and options.placement != 'UNIT':
         rest = 1 - _UNWRAPPING
         yield from mapped(lambda share: _UNWRAPPING + rest * share, stacking.report_overlaps(placed, works, options))

@@ -52,10 +52,12 @@ class Work:
     @cached_property
     def uv_fault(self):
         """Why the map has no UVs for it though there is a map, or an empty text."""
-        corner_uv = np.empty((0, 2)) if self.mesh.uv is None else self.mesh.uv[self._corners]
+        if self.mesh.uv is None:
+            return ""
+        corner_uv = self.mesh.uv[self._corners]
         if not np.isfinite(corner_uv).all():
             return "some of its UVs are no numbers"
-        return "all its UVs are in one place" if len(corner_uv) and not np.ptp(corner_uv, axis=0).any() else ""
+        return "" if np.ptp(corner_uv, axis=0).any() else "all its UVs are in one place"
 
     @property
     def _corners(self):
@@ -170,6 +172,8 @@ class Work:
 
     @property
     def pinned(self):
+        if not self.mesh.has_pins:
+            return np.zeros(len(self.island.vertices), dtype=bool)
         return self._vertices_of(self.mesh.pinned)
 
     @property

@@ -20,7 +20,7 @@ from .triangles import corners_of, signed_areas
 from .unfolding import unfolded
 
 # The starts to choose from, the cheapest first, and the energy that needs no further one
-_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "RINGS": 1000, "MEAN_VALUE": np.inf}
+_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "MEAN_VALUE": 1e6, "RINGS": np.inf}
 # A surface bulges if its outline is so short: then neither its projection nor its conformal map is any good.
 _BULGING = 0.45  # of the squared outline, relative to that of a disk of the surface's area
 _TRACE = 1e-4  # of a surface's area, that flipped triangles may have for it to be as good as valid
