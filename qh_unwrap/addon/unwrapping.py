@@ -50,6 +50,7 @@ def unwrap_targets(
     return outcomes
 
 
+_SAME = 1e-6  # of an island's extent, by which the two sides of a seam may be apart and yet be meant to be one line
 _ROUNDED = 1e-2  # of an island's area, that triangles flipped by rounding may have
 _UNWRAPPING = 0.9  # of all the work, by and large; the rest is to see what lies on what
 
@@ -171,7 +172,14 @@ def _keep(work, result):
     work.certified = report.injective
     outcome.before, outcome.after = report.before, report.after
     outcome.iterations, outcome.converged = report.iterations, report.converged
-    outcome.warnings += (*report.warnings, *_remarks(work.island))
+    outcome.warnings += (*(_of_attached(text, work) for text in report.warnings), *_remarks(work.island))
+
+
+def _of_attached(text, work):
+    """What the core says of pins, where these are vertices that faces hang on which are not selected."""
+    if work.is_attached and "pins make the outline cross" in text and not work.pinned.any():
+        return "faces that are not selected hang on it, and leave its outline no room: select all of its island"
+    return text.replace("with these pins ", "") if not work.pinned.any() else text
 
 
 def _remarks(island):
@@ -272,7 +280,10 @@ def _judge(works, opening=True):
 
 
 def _opened(work):
-    """Whether an island that was certified before it was placed could be opened so that it is so in its place."""
+    """Whether an island that only rounding spoils, where it was placed, could be changed so that it is certified there:
+    its outline is closed where both sides of a seam lie on each other, or opened where they do not."""
+    if _closed(work):
+        return True
     if not work.certified:
         return False
     seen = (-1, 1) if work.mirrored else (1, 1)
@@ -283,6 +294,30 @@ def _opened(work):
     if done:
         work.uv = opened * seen
     return bool(done)
+
+
+def _closed(work):
+    """Whether it is certified once vertices on both sides of a seam have the very same UVs, where rounding alone keeps
+    them apart; then they have."""
+    uv = work.uv
+    rim = np.concatenate(work.loops)
+    rim = rim[~work.held[rim].any(axis=1)]
+    place = work.place
+    order = rim[np.argsort(place[rim], kind="stable")]
+    first = order[np.searchsorted(place[order], place[order])]
+    near = _SAME * np.ptp(uv, axis=0).max() + 4 * np.finfo(np.float32).eps * np.abs(uv).max()
+    apart = np.abs(uv[order] - uv[first]).max(axis=1)
+    joined_up = (apart <= near) & (apart > 0)
+    if not joined_up.any():
+        return False
+    work.uv = uv.copy()
+    work.uv[order[joined_up]] = uv[first[joined_up]]
+    (stored,) = _stored_uvs([work])
+    sign = orientation(stored, work.triangles)
+    if (sign > 0).all() and touches_along_seams_only(stored, work.loops, place):
+        return True
+    work.uv = uv
+    return False
 
 
 def _judge_drawn(work, sign):
@@ -300,6 +335,10 @@ def _judge_doubled(work, sign):
     after = work.outcome.after
     flips, collapsed = _wrong(work, work.doubled, sign)
     work.outcome.after = dataclasses.replace(after, flips=after.flips + flips, collapsed=after.collapsed + collapsed)
+    if flips or collapsed:
+        work.outcome.warnings += (
+            "Blender cuts doubled faces otherwise than their twins: delete the doubles, or triangulate both",
+        )
 
 
 def _wrong(work, triangles, sign):

@@ -52,14 +52,21 @@ class Course(Improvement):
         self._keep_what_was_valid()
 
     def _keep_what_was_valid(self) -> None:
-        """Where the map has flips and the given one has none, take that; but a start that is wanted as it is stays."""
+        """Where the map has flips and the given one has none, take that; but a start that is wanted as it is stays.
+
+        What ends with flips and nothing else to say of it gets a word.
+        """
         batch, settings = self.batch, self.settings
-        if not (settings.repair and (settings.iterations or self.refining) and batch.has_uv.any()):
+        if self.sure.all() or not (settings.repair and (settings.iterations or self.refining)):
             return
         surface = batch.surface
-        spoilt = batch.has_uv & wrong_pieces([surface], self.placed(self.best))
-        if spoilt.any():
-            spoilt &= ~wrong_pieces([surface], batch.uv)
+        flipped = wrong_pieces([surface], self.placed(self.best))
+        if not flipped.any():
+            return
+        spoilt = flipped & batch.has_uv & ~wrong_pieces([surface], batch.uv)
+        for k in np.flatnonzero(flipped & ~spoilt).tolist():
+            if k not in self.faults and not self.warnings[k]:
+                self.warnings[k] = ("no map without flips was found: mark a seam along it",)
         for k in np.flatnonzero(spoilt).tolist():
             its = batch.rows_of(k)
             self.best[its] = self.now[its] = batch.uv[its]

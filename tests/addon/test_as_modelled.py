@@ -281,3 +281,40 @@ def test_what_rounding_would_flip_is_opened(seed, monkeypatch):
     opened, (report,) = unwrapped(points, faces)
     assert report["injective"]
     assert uvs(opened)[:, 0].min() > 75_000
+
+
+@pytest.mark.parametrize(("size", "radius", "angle"), [(3, 2, 2), (6, 5, 1), (4, 3, 1), (6, 3, 3)])
+def test_a_slit_in_a_rolled_sheet_is_closed(size, radius, angle):
+    """Flat again, its sides lie on each other but for rounding."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(size + 1.0), np.arange(size + 1.0), indexing="ij"))
+    cos, sin = np.cos(angle), np.sin(angle)
+    rolled = np.column_stack([radius * np.sin(x / radius), y, radius * np.cos(x / radius)])
+    points = rolled @ [(cos, sin, 0), (-sin, cos, 0), (0, 0, 1)]
+    _, faces = sheet(size)
+    across = size + 1
+    seams = {(across, across + 1), (across + 1, 2 * across + 1)}
+    _, (report,) = unwrapped(points, faces, seams=seams)
+    assert report["injective"]
+    assert report["warnings"] == ["it touches itself along a seam, and covers nothing twice"]
+
+
+def test_a_doubled_face_that_is_cut_otherwise_says_what_to_do():
+    points = [(8, 2, 1), (8, 1, 1), (8, 1, 0.6), (8, 0.7, 0), (7, 0, 0)]
+    _, (report,) = unwrapped(points, [(1, 2, 3, 4, 0), (3, 4, 0, 1, 2)])
+    assert not report["injective"]
+    assert any("delete the doubles, or triangulate both" in text for text in report["warnings"])
+
+
+def test_what_ends_with_flips_has_a_word():
+    """A tube of three sides, a hundred times as long as wide, closed but for one face."""
+    angle = 2 * np.pi * np.arange(3) / 3
+    points = [(np.cos(a), 0.01 * np.sin(a), 0.7 * level) for level in range(13) for a in angle]
+    points += [(0, 0, 0), (0, 0, 8.4)]
+    faces = [
+        (3 * j + i, 3 * j + (i + 1) % 3, 3 * j + 3 + (i + 1) % 3, 3 * j + 3 + i) for j in range(12) for i in range(3)
+    ]
+    faces += [(36 + i, 36 + (i + 1) % 3, 40) for i in range(3)] + [((i + 1) % 3, i, 39) for i in range(3)]
+    del faces[np.random.default_rng(0).choice(len(faces), 1, replace=False)[0]]
+    _, (report,) = unwrapped(points, faces)
+    assert report["injective"] or any("mark a seam along it" in text for text in report["warnings"])
+    assert report["injective"] or report["after"]["flips"]
