@@ -81,7 +81,7 @@ def unfolded_in_air(
     """
     (low,), (size,) = surface.boxes(uv)
     size = size.max()
-    air = make_air((uv - low) / size, surface.loops, triangulate)
+    air = make_air((uv - low) / size, surface.loops, triangulate) if size > 0 else None
     if air is None:
         return uv, False
     everything = np.vstack([uv, low + size * air.points])
