@@ -36,9 +36,8 @@ def in_place(uv: np.ndarray, triangles: np.ndarray, old: np.ndarray) -> np.ndarr
     signed = signed_areas(old)
     if (signed * np.sign(signed.sum()) < 0).any():
         growth = np.abs(signed) / np.maximum(np.abs(signed_areas(new)), np.finfo(float).tiny)
-        sound = growth <= _THROWN * np.median(growth)
-        if sound.any():
-            new, old = new[sound], old[sound]
+        sound = growth <= _THROWN * np.median(growth[growth > 0])
+        new, old = new[sound], old[sound]
     area, old_area = (float(np.abs(signed_areas(each)).sum()) for each in (new, old))
     centre, old_centre = _centre(new), _centre(old)
     z, w = ((each.reshape(-1, 2) - middle) @ (1, 1j) for each, middle in ((new, centre), (old, old_centre)))

@@ -63,6 +63,14 @@ def test_one_vertex_thrown_elsewhere_moves_nothing_else():
     assert np.abs(uvs(obj) - values).max() < 0.1
 
 
+def test_a_map_with_flips_that_mostly_lies_in_one_place_keeps_its_size():
+    points = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (3, 0), (2, 1), (3, 1)], dtype=float)
+    triangles = np.array([(0, 1, 2), (0, 2, 3), (1, 4, 6), (1, 6, 2), (4, 5, 7), (4, 7, 6)])
+    old = np.zeros((6, 3, 2))
+    old[0], old[1] = points[triangles[0]], points[triangles[1]][::-1]  # the second one is flipped
+    assert np.ptp(placing.in_place(points, triangles, old), axis=0).min() > 0.1
+
+
 def test_in_place_has_numbers_even_without_area():
     uv, triangles = np.zeros((3, 2)), np.array([(0, 1, 2)])
     assert np.isfinite(placing.in_place(uv, triangles, np.array([[(0, 0), (1, 0), (0, 1)]]))).all()
