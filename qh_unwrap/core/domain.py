@@ -21,6 +21,8 @@ from .settings import Settings
 from .systems import Constrained
 from .triangles import corners_of, signed_areas
 
+_WINDING = 25  # squared vertices on the outline, by all vertices, from which on the order is made anew with the air,
+_CHEAP = 10_000  # where there are fewer vertices than this, since it takes long for more
 _WORN = 0.3  # air is renewed when a triangle keeps less than this part of its quality
 
 
@@ -294,10 +296,12 @@ class Plane:
         self._quality = quality(corners_of(everything, self._air.triangles))
 
     def _order(self, uv):
-        """The island's vertices in the order that they have without air, too, if they are many."""
+        """The island's vertices in the order that they have without air, too, if they are many; unless its outline
+        winds so much, as that of a closed model cut open, that air joins what the order takes apart."""
         n = len(self.island.vertices)
         dissection = self.island.dissection
-        if dissection is None:
+        rim = sum(len(loop) for loop in self.island.loops)
+        if dissection is None or (n < _CHEAP and rim * rim > _WINDING * n):
             return nested_dissection(
                 uv, self.triangles.edges, self.vertex_piece if self.island.piece_count > 1 else None
             )
