@@ -5,7 +5,6 @@ Exit codes: 0 everything unwrapped, 1 something failed (the rest is written), 2 
 130 and 143 after SIGINT and SIGTERM.
 """
 
-import argparse
 import dataclasses
 import json
 import os
@@ -13,49 +12,13 @@ import traceback
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from . import __version__, console
+from . import console, flags
 from .addon import stopping, streams, writing
 from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
 from .addon.failures import FileError, UsageError
 from .addon.options import MeshOptions
 from .core import Settings, UnwrapError
 from .core.stepping import finished, mapped
-
-_DESCRIPTION = "Unwrap meshes with little distortion and without flipped faces."
-_INPUT = (
-    "a .blend, .obj, .ply, .stl, .glb, .gltf, .fbx, .usd, .usda or .usdc file,"
-    " or the word 'suzanne' for Blender's monkey with seams"
-)
-_EPILOG = """\
-examples:
-  qh-unwrap model.obj -o unwrapped.obj
-      unwrap every island with the least distortion
-  qh-unwrap model.fbx -o unwrapped.fbx --json report.json --strict
-      for a pipeline: 1 if an island is not certified, and all the numbers in a file
-  qh-unwrap scene.blend -o scene.blend --overwrite --object 'Wall*' --uv-map Lightmap --placement PACK
-      pack a second UV map of some objects, in the same file
-  qh-unwrap model.obj --boundary CIRCLE --balance 0.5 --refine 0 --preview picture.png
-      look at the published map, and write nothing else
-
-exit codes:
-  0  everything is unwrapped
-  1  some islands failed, or with --strict are not certified; the rest is written
-  2  wrong usage
-  3  nothing could be written: nothing was unwrapped, or a file could not be read or written
-  130, 143  stopped by Ctrl C or SIGTERM; nothing half done is left
-"""
-_NEEDS = {  # what each flag counts with, where its description does not say so
-    "aspect": "only with --boundary RECTANGLE",
-    "weights": "all but COTANGENT need another --boundary than FREE",
-    "initial": "CURRENT needs UVs",
-    "fill_holes": "only with another --boundary than FREE",
-    "tensor_power": "only in the iterations, not in the refinement",
-    "tolerance": "only with --refine 0",
-    "margin_method": "only where islands are packed",
-    "margin": "only where islands are packed",
-    "rotate": "only with --placement PACK",
-}
-_SPLIT = (".glb", ".gltf", ".stl", ".ply")  # what has its vertices split, or each face for itself
 
 _command = None
 
@@ -77,7 +40,7 @@ def unregister():
 def main(argv=None):
     with stopping.stoppable():
         try:
-            args = _parser().parse_args(argv)
+            args = flags.parser().parse_args(argv)
         except SystemExit as stop:  # argparse, after --help
             return stop.code
         except UsageError as error:
@@ -95,7 +58,7 @@ def main(argv=None):
 
 def unwrap_file(path, output=None, **options):
     """Unwrap a file as the command line does; see `qh_unwrap.unwrap_file`."""
-    args = _parser().parse_args(["suzanne"])
+    args = flags.parser().parse_args(["suzanne"])
     known = {name: value for name, value in vars(args).items() if name not in _NOT_IN_PYTHON}
     unknown = sorted(options.keys() - known.keys())
     if unknown:
@@ -125,90 +88,9 @@ _NOT_IN_PYTHON = ("input", "output", "quiet", "verbose")
 _REPEATABLE = ("object", "collection", "material")
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message):
-        raise UsageError(f"{message} (qh-unwrap --help tells all flags)")
-
-
-def _parser():
-    parser = _Parser(
-        prog="qh-unwrap",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
-    parser.add_argument("input", metavar="INPUT", help=_INPUT)
-    parser.add_argument("-o", "--output", type=Path, help="file to write, in any of these formats except .stl")
-    parser.add_argument("--object", action="append", metavar="NAME", help="unwrap this object only; may be repeated")
-    parser.add_argument("--seams-from-islands", action="store_true", help="first mark the cuts of the old UVs as seams")
-    parser.add_argument(
-        "--collection",
-        action="append",
-        metavar="NAME",
-        help="unwrap the objects in this collection only; may be repeated."
-        " Here as in --object and --material, NAME can be a pattern like 'Wall*' or '*[0-9]'",
-    )
-    parser.add_argument(
-        "--material", action="append", metavar="NAME", help="unwrap the faces with this material only; may be repeated"
-    )
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument(
-        "--uv-map", metavar="NAME", help="write into this UV map, not the active one; it is made where it is missing"
-    )
-    which.add_argument(
-        "--texcoord", type=int, metavar="N", help="write into the N-th UV map, from 0; the next one after all is made"
-    )
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="write a report, also if the run fails; - prints it, and no table"
-    )
-    parser.add_argument(
-        "--preview", type=Path, metavar="FILE", help="draw the model and its UVs, checkered, into a .png or .jpg file"
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
-    parser.add_argument("--strict", action="store_true", help="count islands that are not certified as failed")
-    loudness = parser.add_mutually_exclusive_group()
-    loudness.add_argument("--quiet", action="store_true", help="show nothing but errors")
-    loudness.add_argument("--verbose", action="store_true", help="show every island, however many there are")
-    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    for title, kind in (("unwrapping", Settings), ("mesh and placement", MeshOptions)):
-        group = parser.add_argument_group(title)
-        for field in dataclasses.fields(kind):
-            action = group.add_argument(f"--{field.name.replace('_', '-')}", **_argument(field))
-            action.help = _help(field).replace("%", "%%")
-    return parser
-
-
-def _argument(field):
-    if field.name == "weld":
-        return dict(action=argparse.BooleanOptionalAction, default=None)
-    if type(field.default) is bool:
-        return dict(action=argparse.BooleanOptionalAction, default=field.default)
-    if field.metadata["choices"]:
-        names = [choice.identifier for choice in field.metadata["choices"]]
-        return dict(type=str.upper, choices=names, metavar="NAME", default=field.default)
-    return dict(type=type(field.default), metavar="NUMBER", default=field.default)
-
-
-def _help(field):
-    meta, default = field.metadata, field.default
-    notes = [_NEEDS[field.name]] if field.name in _NEEDS else []
-    if field.name == "weld":
-        notes.append(f"on if not given for {', '.join(_SPLIT)}, off for others")
-    elif type(default) is bool:
-        notes.append(f"default {'on' if default else 'off'}")
-    elif meta["choices"]:
-        notes.append(f"default {default}")
-    else:
-        low, high = meta["range"]
-        notes.append(f"{low:g} to {high:g}, default {default:g}")
-    texts = "; ".join(f"{choice.identifier}: {choice.description}" for choice in meta["choices"])
-    return f"{meta['description']} ({'; '.join(notes)}){f'. {texts}' if texts else ''}"
-
-
 def _understood(argv):
     """What counts of arguments that are wrong in some other place: where to write the report, and how."""
-    parser = _Parser(add_help=False, allow_abbrev=False)
+    parser = flags.Parser(add_help=False, allow_abbrev=False)
     parser.add_argument("--json", type=Path)
     for name in ("overwrite", "quiet", "verbose"):
         parser.add_argument(f"--{name}", action="store_true")
@@ -258,7 +140,7 @@ def _run(args, record, progress):
     record.strict = bool(args.strict)
     _check_paths(args)
     if args.weld is None:
-        args.weld = Path(args.input).suffix.lower() in _SPLIT
+        args.weld = Path(args.input).suffix.lower() in flags.SPLIT
     try:
         settings, options = (_made_from(args, kind) for kind in (Settings, MeshOptions))
         settings.check_together()

@@ -4,6 +4,7 @@
 import dataclasses
 import itertools
 from collections.abc import Generator, Sequence
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from ..core import Settings, Shape, Surface, UnwrapError, distortion, placing, unwrap_islands
 from ..core.certificate import are_injective, as_stored, orientation
 from ..core.contacts import touches_along_seams_only
+from ..core.course import PINS_CROSS
 from ..core.delaunay import triangulate
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import attached, find_islands
@@ -159,6 +161,7 @@ def _uncut(mesh):
     return "mark the cuts with UV > Seams from Islands"
 
 
+_NO_ROOM = "faces that are not selected hang on it, and leave its outline no room: select all of its island"
 _HANGS = " (faces that are not selected hang on it: or select all of its island)"
 
 
@@ -172,14 +175,10 @@ def _keep(work, result):
     work.certified = report.injective
     outcome.before, outcome.after = report.before, report.after
     outcome.iterations, outcome.converged = report.iterations, report.converged
-    outcome.warnings += (*(_of_attached(text, work) for text in report.warnings), *_remarks(work.island))
-
-
-def _of_attached(text, work):
-    """What the core says of pins, where these are vertices that faces hang on which are not selected."""
-    if work.is_attached and "pins make the outline cross" in text and not work.pinned.any():
-        return "faces that are not selected hang on it, and leave its outline no room: select all of its island"
-    return text.replace("with these pins ", "") if not work.pinned.any() else text
+    # To the core, vertices that faces hang on which are not selected are pins.
+    hanging = work.is_attached and not work.pinned.any()
+    warnings = (_NO_ROOM if hanging and text == PINS_CROSS else text for text in report.warnings)
+    outcome.warnings += (*warnings, *_remarks(work.island))
 
 
 def _remarks(island):
@@ -231,50 +230,47 @@ def pack_apart(targets: Sequence[Target], options: MeshOptions, context: bpy.typ
             mesh_arrays.write(obj, np.concatenate(corners), np.concatenate(uvs))
 
 
-def _judge(works, opening=True):
-    """Say what there is to say of the UVs that Blender will store, rounded where they lie now, and of the triangles
-    that it draws.
+class _Seen(NamedTuple):
+    """An island as Blender will store it, rounded where it lies now."""
 
-    What is certified but for rounding is opened there, if `opening`.
-    """
-    if not works:
-        return
+    uv: np.ndarray  # (n, 2)
+    sign: np.ndarray  # (t,) the orientation of the triangles that Blender draws
+    is_injective: bool  # but for triangles without area, and without any contact
+
+
+def _seen(works):
     uvs = _stored_uvs(works)
     uv, triangles, first, triangle_starts = joined(uvs, [work.drawn for work in works])
-    piece = numbers(triangle_starts, len(triangles))
     sign = orientation(uv, triangles)
     loops = [loop + start for work, start in zip(works, first, strict=True) for loop in work.loops]
-    solid = sign != 0  # those without area do not count, unless they should have some
     loop_piece = np.repeat(np.arange(len(works)), [len(work.loops) for work in works])
+    solid = sign != 0  # those without area do not count, unless they should have some
+    piece = numbers(triangle_starts, len(triangles))
     certified = are_injective(uv, triangles[solid], piece[solid], loops, loop_piece)
-    if opening:
-        rounded = [
-            work for work, certain in zip(works, certified.tolist(), strict=True) if not certain and _opened(work)
-        ]
-        if rounded:
-            _judge(rounded, opening=False)
-            mended = {id(work) for work in rounded}
-            _judge([work for work in works if id(work) not in mended], opening=False)
-            return
+    return [_Seen(*each) for each in zip(uvs, np.split(sign, triangle_starts[1:]), certified.tolist(), strict=True)]
 
-    redrawn = [k for k, work in enumerate(works) if work.is_redrawn]
-    changed = sign != np.concatenate([work.outcome.after.triangle_orientation for work in works])
-    for k in np.union1d(np.unique(piece[changed]), redrawn).astype(int):
-        work = works[k]
-        work.outcome.after = distortion(work.vertices, work.triangles, uvs[k] * work.aspect)
+
+def _judge(works):
+    """Say what there is to say of the UVs that Blender will store, and of the triangles that it draws; what only
+    rounding spoils is mended first."""
+    if not works:
+        return
+    seen = _seen(works)
+    mended = [k for k, each in enumerate(seen) if not each.is_injective and _opened(works[k])]
+    if mended:
+        for k, each in zip(mended, _seen([works[k] for k in mended]), strict=True):
+            seen[k] = each
+    for work, (uv, sign, is_injective) in zip(works, seen, strict=True):
+        outcome = work.outcome
+        if work.is_redrawn or not np.array_equal(sign, outcome.after.triangle_orientation):
+            outcome.after = distortion(work.vertices, work.triangles, uv * work.aspect)
         if work.is_redrawn:
-            _judge_drawn(work, sign[piece == k])
-    for work, its_uv in zip(works, uvs, strict=True):
+            _judge_drawn(work, sign)
         if work.island.doubled_faces:
-            _judge_doubled(work, orientation(its_uv, work.doubled))
-
-    flipped = np.zeros(len(works), dtype=bool)
-    flipped[piece[sign < 0]] = True
-    for work, its_uv, certain, upside_down in zip(works, uvs, certified.tolist(), flipped.tolist(), strict=True):
-        after, outcome = work.outcome.after, work.outcome
-        outcome.injective = not (after.flips or after.collapsed or upside_down)
-        if outcome.injective and not certain:
-            outcome.injective = touches_along_seams_only(its_uv, work.loops, work.place)
+            _judge_doubled(work, orientation(uv, work.doubled))
+        outcome.injective = not (outcome.after.flips or outcome.after.collapsed or (sign < 0).any())
+        if outcome.injective and not is_injective:
+            outcome.injective = touches_along_seams_only(uv, work.loops, work.place)
             if outcome.injective:
                 outcome.warnings += ("it touches itself along a seam, and covers nothing twice",)
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from . import errors
 from .ordering import FEW, Dissection, banded
-from .topology import Topology, checked_arrays, edge_keys, half_edges
+from .topology import HalfEdges, Topology, checked_arrays, edge_keys
 from .triangles import areas_in_space, corner_angles, corners_of, hat_gradients, laid_flat, signed_areas
 
 _UNSEEN = 1e-2  # of its made-up area, the weight in the energy of a face without area, so that it cannot flip either
 
 
-class Chart:
+class Chart(HalfEdges):
     """Triangles of one or several pieces, with the fields that operators read.  No operator asks whose they are.
 
     Attributes
@@ -77,16 +77,6 @@ class Chart:
         if len(present):
             result[present] = function.reduceat(values, starts)
         return result
-
-    @property
-    def half_edges(self) -> tuple[np.ndarray, np.ndarray]:
-        """Start and end vertices of the half-edges, (3 m,) each; number c * m + t runs from corner c of triangle t."""
-        return half_edges(self.triangles)
-
-    @property
-    def half_edge_edges(self) -> np.ndarray:
-        """The edge of every half-edge, (3 m,)."""
-        return self.triangle_edges.T.ravel()
 
     def angle_sums(self, n: int) -> np.ndarray:
         """The sum of the triangles' angles at each of n vertices, (n,), in radians."""

@@ -20,6 +20,7 @@ from .settings import Settings
 from .starts import best_start, natural_start, start_within, with_pins
 from .weights import scheme
 
+PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
 _NEAR = 1.2  # the energy of a start from which the refinement alone soon arrives
 _LONG = 1.5  # the squared outline from which on it may well cross itself, relative to that of a disk of the same area
 _IN_AIR = 2000  # triangles of the pieces that are improved together with air around them
@@ -71,8 +72,7 @@ class Course(Improvement):
             its = batch.rows_of(k)
             self.best[its] = self.now[its] = batch.uv[its]
             self.sure[k], self.valid[k] = False, True
-            pins = "with these pins " if batch.has_pins[k] else ""
-            self.warnings[k] = (f"its UVs stay as they were: {pins}no other map without flips was found",)
+            self.warnings[k] = ("its UVs stay as they were: no other map without flips was found",)
 
     def resume(self, settings: Settings) -> Steps:
         """Go on from the maps as they are with other settings, or with what the batch now fixes."""
@@ -209,7 +209,7 @@ class Course(Improvement):
             for k in np.flatnonzero(missing):
                 text = "the outline stays as it is: there is no room to free it"
                 if crossed[k] and batch.has_pins[k]:
-                    text = "the pins make the outline cross itself: unpin some, or move them"
+                    text = PINS_CROSS
                 self.warnings[k] = (text,)
             yield from self.improve(self._group(missing, start, rigid))
 

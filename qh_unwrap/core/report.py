@@ -105,8 +105,4 @@ def face_warnings(flat: np.ndarray, face: np.ndarray | None) -> tuple[str, ...]:
     if count and face is not None:
         faces, parts = np.unique(face, return_inverse=True)
         count = len(faces) - len(np.unique(parts[~flat]))
-    return _zero_area(count)
-
-
-def _zero_area(flat):
-    return (f"{flat} {'face has' if flat == 1 else 'faces have'} zero area",) if flat else ()
+    return (f"{count} {'face has' if count == 1 else 'faces have'} zero area",) if count else ()

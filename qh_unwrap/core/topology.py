@@ -17,7 +17,25 @@ from .pieces import components, first_and_last, numbers
 _KEYS = 2_000_000  # vertices, up to which the numbers of three go into one number of 64 bits
 
 
-class Topology:
+class HalfEdges:
+    """Mix-in for what has `triangles` (m, 3) and `triangle_edges` (m, 3): half-edge c * m + t runs from corner c of
+    triangle t."""
+
+    triangles: np.ndarray
+    triangle_edges: np.ndarray
+
+    @property
+    def half_edges(self) -> tuple[np.ndarray, np.ndarray]:
+        """Start and end vertices of the half-edges, (3 m,) each."""
+        return half_edges(self.triangles)
+
+    @property
+    def half_edge_edges(self) -> np.ndarray:
+        """The edge of every half-edge, (3 m,)."""
+        return self.triangle_edges.T.ravel()
+
+
+class Topology(HalfEdges):
     """The connections of triangles.  Everything can be asked of whatever triangles there are; nothing raises.
 
     Parameters
@@ -52,16 +70,6 @@ class Topology:
     def piece_count(self) -> int:
         """How many pieces there are, p."""
         return len(self.vertex_starts)
-
-    @property
-    def half_edges(self) -> tuple[np.ndarray, np.ndarray]:
-        """Start and end vertices of the half-edges, (3 m,) each."""
-        return half_edges(self.triangles)
-
-    @property
-    def half_edge_edges(self) -> np.ndarray:
-        """The edge of every half-edge, (3 m,)."""
-        return self.triangle_edges.T.ravel()
 
     @cached_property
     def on_boundary(self) -> np.ndarray:
