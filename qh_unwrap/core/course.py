@@ -24,6 +24,7 @@ PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
 _NEAR = 1.2  # the energy of a start from which the refinement alone soon arrives
 _LONG = 1.5  # the squared outline from which on it may well cross itself, relative to that of a disk of the same area
 _IN_AIR = 2000  # triangles of the pieces that are improved together with air around them
+_PATIENCE = 30.0  # with maps that go on, so that they end no higher than those that begin anew
 _LEADS = 12  # times that pins are moved on, before their island begins anew
 _HALVINGS = 8  # of their way, each of these times
 
@@ -80,9 +81,10 @@ class Course(Improvement):
         self.sure[:] = False
         names = ("boundary", "aspect", "fill_holes")
         if any(getattr(before, name) != getattr(settings, name) for name in names):
-            self.live = None
+            self.live, self.patience = None, 1.0
             yield from self.run()
             return
+        self.patience = 1.0 if settings == before else _PATIENCE
         self.converged[:] = False
         live, self.live = self.live, None
         if settings.boundary != "FREE":

@@ -21,12 +21,13 @@ _RESIDUAL = 0.03  # of Newton's equations, relative to the gradient
 
 
 def newton_step(
-    domain: Domain, uv: np.ndarray, balance: float, size: np.ndarray, going: np.ndarray
+    domain: Domain, uv: np.ndarray, balance: float, size: np.ndarray, going: np.ndarray, patience: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """One step down the energy of the map `uv` (n, 2) in the pieces that are `going` (p,); the others stay.
 
     `size` (p,) is the scale of each piece's map that the energy aims at.  Returns the map before, maybe with new air,
-    the map after, and for which pieces (p,) no further step would pay.  Pieces with flips stay and are done.
+    the map after, and for which pieces (p,) no further step would pay; with more `patience`, smaller gains do.  Pieces
+    with flips stay and are done.
     """
     uv = domain.renewed(uv)
     energy = Barrier(domain, uv, balance, size)
@@ -38,7 +39,7 @@ def newton_step(
     if not sound.all():
         # Equations with flipped triangles are no equations: leave these pieces out.
         part, its_uv = domain.of(sound, uv)
-        _, its_uv, its_done = newton_step(part, its_uv, balance, size[sound], going[sound])
+        _, its_uv, its_done = newton_step(part, its_uv, balance, size[sound], going[sound], patience)
         done = np.ones(len(start), bool)
         done[sound] = its_done
         after = uv.copy()
@@ -59,7 +60,7 @@ def newton_step(
         length[steep] = 0
     after = uv + (length[0] if len(length) == 1 else length[piece, None]) * direction
     worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
-    return uv, after, (length == 0) | (start - value < worth)
+    return uv, after, (length == 0) | (start - value < worth / patience)
 
 
 def _newton_direction(domain, energy, jacobian):

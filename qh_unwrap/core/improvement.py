@@ -79,6 +79,7 @@ class Improvement:
     warnings : list of tuples
     faults : dictionary from pieces to the errors for which they have no map
     live : what moves at the moment, if that is the whole batch
+    patience : how much smaller gains than usual are worth a step of the refinement
     """
 
     def __init__(self, batch: Batch, settings: Settings):
@@ -90,6 +91,7 @@ class Improvement:
         self.warnings: list[tuple[str, ...]] = [()] * p
         self.faults: dict[int, UnwrapError] = {}
         self.live: Group | None = None
+        self.patience = 1.0
 
     @property
     def refining(self) -> bool:
@@ -201,7 +203,7 @@ class Improvement:
         folded = _folded(group)
         for number in range(settings.refine):
             domain = group.domain
-            before, after, done = newton_step(domain, group.uv, settings.balance, size, going)
+            before, after, done = newton_step(domain, group.uv, settings.balance, size, going, self.patience)
             if after is before:
                 return
             group.uv = before
