@@ -57,6 +57,11 @@ class Batch:
             return self.has_uv
         return self.has_uv & (self.has_pins | self.has_partners) & (settings.boundary == "FREE")
 
+    def apart(self, uv: np.ndarray) -> np.ndarray:
+        """In which pieces (p,) bool of the map `uv` (n, 2) pins are elsewhere than they are to be."""
+        away = (self.pinned & (uv != self.uv)).any(axis=1)
+        return np.logical_or.reduceat(away, self.surface.vertex_starts)
+
     def rows(self, pieces: np.ndarray) -> np.ndarray:
         """(n,) bool, the vertices of the chosen pieces, (p,) bool."""
         return pieces[self.surface.vertex_piece]

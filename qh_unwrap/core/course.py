@@ -16,17 +16,17 @@ from .chart import Surface
 from .domain import Fixed, Plane, airs_around, loose, outlined, rigid
 from .energy import energies
 from .improvement import ISOMETRIC, D, Group, Improvement, Steps
+from .pins import lead
 from .settings import Settings
-from .starts import best_start, natural_start, start_within, with_pins
-from .weights import scheme
+from .starts import before_pins, best_start, natural_start, start_within, with_pins
 
 PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
+PINS_FLIP = "no map without flips was found with these pins: unpin some, or move them"
 _NEAR = 1.2  # the energy of a start from which the refinement alone soon arrives
 _LONG = 1.5  # the squared outline from which on it may well cross itself, relative to that of a disk of the same area
 _IN_AIR = 2000  # triangles of the pieces that are improved together with air around them
-_PATIENCE = 30.0  # with maps that go on, so that they end no higher than those that begin anew
 _LEADS = 12  # times that pins are moved on, before their island begins anew
-_HALVINGS = 8  # of their way, each of these times
+_PATIENCE = 30.0  # with maps that go on, so that they end no higher than those that begin anew
 
 
 class Course(Improvement):
@@ -68,7 +68,9 @@ class Course(Improvement):
         spoilt = flipped & batch.has_uv & ~wrong_pieces([surface], batch.uv)
         for k in np.flatnonzero(flipped & ~spoilt).tolist():
             if k not in self.faults and not self.warnings[k]:
-                self.warnings[k] = ("no map without flips was found: mark a seam along it",)
+                self.warnings[k] = (
+                    PINS_FLIP if batch.has_pins[k] else "no map without flips was found: mark a seam along it",
+                )
         for k in np.flatnonzero(spoilt).tolist():
             its = batch.rows_of(k)
             self.best[its] = self.now[its] = batch.uv[its]
@@ -90,7 +92,7 @@ class Course(Improvement):
         if settings.boundary != "FREE":
             yield from self._outlined(self.best)
         elif (self.batch.has_pins | self.batch.has_partners).any():
-            yield from self._led(live)
+            yield from self._after_pins(live)
         elif live is not None:
             live.uv, _ = live.domain.recalled(live.uv, self.best, np.ones(len(live.pieces), bool))
             yield from self.improve(live)
@@ -128,21 +130,25 @@ class Course(Improvement):
     def _free(self) -> Steps:
         """With outlines that are free."""
         batch, settings = self.batch, self.settings
-        surface = batch.surface
-        held = batch.has_pins
-        start, certified = batch.uv, None
+        surface, p = batch.surface, batch.surface.piece_count
+        start, certified, to_lead = batch.uv, None, np.zeros(p, bool)
         if settings.initial == "AUTO":
-            new = ~(held & ~wrong_pieces([surface], batch.uv))
+            good = batch.has_pins & ~wrong_pieces([surface], start)
+            if (batch.has_pins & ~good).any():
+                before = before_pins(surface, start, batch.pinned)
+                to_lead = batch.has_pins & ~good & ~wrong_pieces([surface], before)
+                start = np.where(batch.rows(to_lead)[:, None], before, start)
+            new = ~(good | to_lead)
             if new.any():
-                start = batch.uv.copy()
+                start = start.copy()
                 start[batch.rows(new)], known = best_start(surface if new.all() else surface.of(new), settings)
-                certified = np.zeros(surface.piece_count, bool)
+                certified = np.zeros(p, bool)
                 certified[new] = known
         elif settings.initial != "CURRENT":
             start = natural_start(surface, settings, settings.initial)
-        if held.any():
-            start = with_pins(surface, start, batch.uv, batch.pinned)
-            certified = None
+        if batch.has_pins.any():
+            placed = with_pins(surface, start, batch.uv, batch.pinned)
+            start, certified = np.where(batch.rows(to_lead)[:, None], start, placed), None
         self._begin(start)
         yield from self._freely(start, settings.initial == "AUTO" or not settings.iterations, certified)
 
@@ -161,7 +167,7 @@ class Course(Improvement):
             value = energies(surface, start, settings.balance)
             if (value < _NEAR).any():
                 certified = certified_pieces(surface, start) if certified is None else certified
-                done = certified & (value <= ISOMETRIC)
+                done = certified & (value <= ISOMETRIC) & ~batch.apart(start)
                 near = certified & (value < _NEAR) & ~done & ~(batch.has_pins | batch.has_partners) & directly
         self.converged |= done
         if (done | near).any():
@@ -186,18 +192,23 @@ class Course(Improvement):
         if far.any():
             yield from self._in_air(far, start.copy())
 
-    def _in_air(self, pieces: np.ndarray, start: np.ndarray) -> Steps:
-        """Improve the maps of the chosen pieces with air around them, or with their outlines as they are."""
+    def _in_air(self, pieces: np.ndarray, start: np.ndarray, following: bool = False) -> Steps:
+        """Improve the maps of the chosen pieces with air around them, or with their outlines as they are.
+
+        Where pins are elsewhere than in the `start`, it is led after them first, and if `following`, everywhere.
+        """
         batch = self.batch
         airs: dict[int, Air] = {}
         missing = pieces.copy()
         self._make_airs(missing, start, airs)
+        apart = batch.apart(start) & pieces
+        self._put_pins(start, apart & missing)
         # A valid map that pins hold stays, whether or not there is room for air; any other gives way to a circle.
         crossed = missing & ~(batch.has_pins & ~wrong_pieces([batch.surface], start))
         if crossed.any():
-            part, rows = batch.surface.of(crossed), batch.rows(crossed)
-            circle = natural_start(part, self.settings, "MEAN_VALUE")
-            start[rows] = with_pins(part, circle, batch.uv[rows], batch.pinned[rows])
+            rows = batch.rows(crossed)
+            start[rows] = natural_start(batch.surface.of(crossed), self.settings, "MEAN_VALUE")
+            self._put_pins(start, crossed)
             self.start[rows] = self.now[rows] = self.best[rows] = start[rows]
             for k in np.flatnonzero(crossed):
                 self.warnings[k] += ("the start overlaps itself: begun with a circle",)
@@ -206,7 +217,11 @@ class Course(Improvement):
             missing &= ~crossed | still
         for within in self._portions(pieces & ~missing):
             its = [airs[k] for k in np.flatnonzero(within).tolist()]
-            yield from self.improve(self._group(within, start, partial(Plane, airs=its, triangulate=self._triangulate)))
+            group = self._group(within, start, partial(Plane, airs=its, triangulate=self._triangulate))
+            if following or (apart & within).any():
+                yield from self._led(group)
+            else:
+                yield from self.improve(group)
         if missing.any():
             for k in np.flatnonzero(missing):
                 text = "the outline stays as it is: there is no room to free it"
@@ -249,54 +264,43 @@ class Course(Improvement):
 
     # Pins that moved
 
-    def _led(self, group: Group | None) -> Steps:
-        """Lead the maps after pins that moved, and improve them; from the live `group`, or from the best maps."""
-        batch, best = self.batch, self.best.copy()
-        everything = np.ones(batch.surface.piece_count, bool)
-        if group is None or not isinstance(group.domain, Plane):
-            airs = [air for air in airs_around(batch.surface, best, self._triangulate) if air is not None]
-            if len(airs) < len(everything):
-                yield from self._in_air(everything, with_pins(batch.surface, best, batch.uv, batch.pinned))
-                return
-            group = self._group(everything, best, partial(Plane, airs=airs, triangulate=self._triangulate))
-        else:
-            group.uv, _ = group.domain.recalled(group.uv, best, everything)
-            group.domain.fix(batch.fixed, group.uv)
+    def _put_pins(self, uv: np.ndarray, pieces: np.ndarray) -> None:
+        """Put the pins of the chosen pieces, (p,) bool, in their places in the map `uv` (n, 2)."""
+        if pieces.any():
+            batch, rows = self.batch, self.batch.rows(pieces)
+            uv[rows] = with_pins(batch.surface.of(pieces), uv[rows], batch.uv[rows], batch.pinned[rows])
+
+    def _after_pins(self, live: Group | None) -> Steps:
+        """Go on from the best maps with pins that were moved; with the `live` group, if there is one."""
+        everything = np.ones(self.batch.surface.piece_count, bool)
+        if live is None or not isinstance(live.domain, Plane):
+            yield from self._in_air(everything, self.best.copy(), following=True)
+            return
+        live.uv, _ = live.domain.recalled(live.uv, self.best, everything)
+        live.domain.fix(self.batch.fixed, live.uv)
+        yield from self._led(live)
+
+    def _led(self, group: Group) -> Steps:
+        """Lead the maps of a group with air after its pins, and improve them; what cannot be led there begins anew."""
+        batch, arrived = self.batch, np.zeros(len(group.pieces), bool)
         for _ in range(_LEADS):
-            arrived = self._lead(group)
+            arrived = lead(group, self.settings, together=batch.partner is not None)
             if arrived.all():
                 break
             group.uv = group.domain.renewed(group.uv)
-        else:
-            # What cannot be led there begins anew.
-            start = best.copy()
-            yield from self._in_air(everything, with_pins(batch.surface, start, batch.uv, batch.pinned))
+        late = np.zeros(batch.surface.piece_count, bool)
+        late[group.pieces[~arrived]] = True
+        if late.any():
+            start = self.best.copy()
+            if self.settings.initial == "AUTO":
+                start[batch.rows(late)], _ = best_start(batch.surface.of(late), self.settings)
+            self._put_pins(start, late)
+            yield from self._in_air(late, start)
+        if not arrived.any():
             return
-        self.best[group.rows] = group.island_uv
+        group = group.of(arrived)
+        self.best[group.rows] = self.now[group.rows] = group.island_uv
         if self.refining:
             yield from self.refine(group)
         else:
             yield from self.improve(group)
-
-    def _lead(self, group: Group) -> np.ndarray:
-        """Move what is held nearer to where it is to be, and the rest with it, as far as nothing flips.
-
-        Returns which pieces have arrived, (p',) bool.  What is in between follows by the equations of an iteration.
-        """
-        domain, uv = group.domain, group.uv
-        constrained, piece = domain.constrained, domain.vertex_piece
-        way = np.where(constrained.held, constrained.values - uv, 0)
-        weights = domain.weights(scheme(self.settings)(domain.charts, uv), uv)
-        way = constrained.factor(weights)(way)
-        part = np.ones(len(group.pieces))
-        for _ in range(_HALVINGS):
-            led = uv + part[piece, None] * way
-            led = np.where(constrained.held & (part[piece, None] == 1), constrained.values, led)
-            wrong = wrong_pieces(domain.charts, led)
-            if not wrong.any():
-                break
-            part[wrong] /= 2
-        else:
-            led = np.where(wrong[piece, None], uv, led)
-        group.uv = led
-        return part == 1

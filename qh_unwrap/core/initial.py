@@ -2,6 +2,7 @@
 """Maps to begin with."""
 
 import numpy as np
+from scipy.interpolate import RBFInterpolator
 
 from .chart import Surface
 from .domain import Fixed, Held
@@ -9,6 +10,7 @@ from .pieces import starts_of
 from .triangles import corners_of, normals, sums_by_parts
 from .weights import cotangent, mean_value, uniform
 
+_SAMPLE = 1000  # points that lead the others, at most
 _WEIGHTS = {"UNIFORM": uniform, "HARMONIC": cotangent, "MEAN_VALUE": mean_value}
 
 
@@ -38,6 +40,28 @@ def _fit(z, chosen, target):
     factor = (np.vdot(centred[chosen], wanted) / size if size > 0 else 0) or 1.0  # it rotates and scales
     fitted = factor * centred + target[chosen].mean()
     return np.linalg.norm(fitted[chosen] - target[chosen]), fitted
+
+
+def led(points: np.ndarray, held: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """The points (n, 2) after their `held` coordinates, (n, 2) bool, went to `values` (n, 2), and the others with them.
+
+    They follow smoothly wherever they lie in between, so that what is mapped one to one mostly stays so.
+    """
+    result = np.where(held, values, points)
+    for axis in range(2):
+        rows = np.flatnonzero(held[:, axis])
+        rows = rows[:: -(-len(rows) // _SAMPLE) or 1]
+        _, first = np.unique(points[rows], axis=0, return_index=True)
+        rows = rows[np.sort(first)]
+        offsets = values[rows, axis] - points[rows, axis]
+        if offsets.any():
+            try:
+                follow = RBFInterpolator(points[rows], offsets, kernel="linear", degree=0)
+            except np.linalg.LinAlgError:  # where points lie too close together
+                continue
+            free = ~held[:, axis]
+            result[free, axis] += follow(points[free])
+    return result
 
 
 def project(surface: Surface) -> np.ndarray:

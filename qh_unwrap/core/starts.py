@@ -13,7 +13,7 @@ from .certificate import certified_pieces, wrong_pieces
 from .chart import Surface
 from .domain import Fixed, Held
 from .energy import energies
-from .initial import conformal, fit, project, weighted_map
+from .initial import conformal, fit, led, project, weighted_map
 from .rings import ring_map
 from .settings import Settings
 from .triangles import corners_of, signed_areas
@@ -83,7 +83,7 @@ def best_start(surface: Surface, settings: Settings) -> tuple[np.ndarray, np.nda
 
 def with_pins(surface: Surface, start: np.ndarray, uv: np.ndarray, pinned: np.ndarray) -> np.ndarray:
     """The map `start` (n, 2) moved, turned and scaled so that the pins lie as near as can be to where `uv` has them,
-    and then put there.
+    and then put there, and the rest with them.
 
     pinned  (n, 2) bool, for U and V
     """
@@ -102,8 +102,16 @@ def with_pins(surface: Surface, start: np.ndarray, uv: np.ndarray, pinned: np.nd
             fitted += (uv[its] - fitted)[chosen].mean(axis=0)
         else:
             fitted = fit(start[its], chosen, uv[its])
-        result[its] = np.where(pinned[its], uv[its], fitted)
+        result[its] = led(fitted, pinned[its], uv[its])
     return result
+
+
+def before_pins(surface: Surface, uv: np.ndarray, pinned: np.ndarray) -> np.ndarray:
+    """The map `uv` (n, 2), of which only the pins were moved, with these back among their neighbours.
+
+    pinned  (n, 2) bool, for U and V
+    """
+    return weighted_map(Held(surface, Fixed(~pinned, uv)), "MEAN_VALUE")
 
 
 def start_within(

@@ -12,6 +12,7 @@ from qh_unwrap.core import (
     Surface,
     UnwrapError,
     Unwrapper,
+    distortion,
     errors,
     locality,
     unwrap,
@@ -153,6 +154,25 @@ def test_a_moved_pin_needs_a_third_of_the_steps(bump, boundary, mirror):
         cold = Unwrapper([Shape(vertices, triangles, given, pinned)], settings)
         assert warm <= steps(cold) / 3
         assert moved.report.after.symmetric_dirichlet < 1.01 * only(cold).report.after.symmetric_dirichlet
+
+
+@pytest.mark.parametrize("far", [0.02, 0.1, 0.2])
+def test_all_follows_one_pin_that_was_dragged_where_it_stretches_much(far):
+    mesh = shapes.bump(1, inner=300, outer=60, height=8)
+    uv = unwrap(*mesh).uv
+    pinned = np.zeros(len(uv), bool)
+    pinned[[5, 60, 150]] = True
+    session = Unwrapper([Shape(*mesh, uv, pinned)])
+    steps(session)
+    dragged = only(session).uv.copy()
+    dragged[60] += far * np.array([0.6, 0.8])
+    session.move(pinned, dragged)
+    assert steps(session) <= 12
+    again = unwrap(*mesh, uv=dragged, pinned=pinned)
+    for result in (only(session), again):
+        np.testing.assert_array_equal(result.uv[pinned], dragged[pinned])
+        assert result.report.injective and not result.report.warnings
+        assert result.report.after.symmetric_dirichlet < 2 * distortion(*mesh, uv).symmetric_dirichlet
 
 
 def test_pins_can_be_set_on_what_is_shown(bump):
