@@ -4,23 +4,16 @@
 import dataclasses
 import itertools
 from collections.abc import Generator, Sequence
-from typing import NamedTuple
 
 import bpy
 import numpy as np
 
-from ..core import Settings, Shape, Surface, UnwrapError, distortion, placing, unwrap_islands
-from ..core.certificate import are_injective, as_stored, orientation
-from ..core.contacts import touches_along_seams_only
+from ..core import Settings, Shape, UnwrapError, placing, unwrap_islands
 from ..core.course import PINS_CROSS
-from ..core.delaunay import triangulate
 from ..core.errors import BoundaryError, UVError
 from ..core.islands import attached, find_islands
-from ..core.pieces import joined, numbers, starts_of
 from ..core.stepping import mapped
-from ..core.triangles import areas_in_space
-from ..core.unfolding import unfolded, unfolded_in_air
-from . import layout, mesh_arrays, modes, stacking
+from . import judging, layout, mesh_arrays, modes, stacking
 from .last_run import last_run
 from .options import MeshOptions
 from .outcome import Outcome, count
@@ -52,8 +45,6 @@ def unwrap_targets(
     return outcomes
 
 
-_SAME = 1e-6  # of an island's extent, by which the two sides of a seam may be apart and yet be meant to be one line
-_ROUNDED = 1e-2  # of an island's area, that triangles flipped by rounding may have
 _UNWRAPPING = 0.9  # of all the work, by and large; the rest is to see what lies on what
 
 
@@ -70,22 +61,17 @@ def _are_as_read(works):
 def _placed(works, options, context):
     """Put the islands where they belong, and see what they lie on there; yields the share that is done, returns those
     that have UVs now."""
+    judging.keep_what_was_valid(works)
+    yield _UNWRAPPING
     layout.place([work for work in works if work.uv is not None], works, options, context)
     yield _UNWRAPPING
     placed = [work for work in works if work.uv is not None]
-    _judge(placed)
+    judging.judge(placed)
     yield _UNWRAPPING
     if placed and options.placement != 'UNIT':
         rest = 1 - _UNWRAPPING
         yield from mapped(lambda share: _UNWRAPPING + rest * share, stacking.report_overlaps(placed, works, options))
     return placed
-
-
-def _stored_uvs(works):
-    """The works' new UVs, (n, 2) each, in Blender's single precision, as seen from where they are not mirrored."""
-    uvs = [work.written_uv for work in works]
-    stored = np.split(as_stored(np.concatenate(uvs)), starts_of(uvs)[1:])
-    return [uv * (-1, 1) if work.mirrored else uv for work, uv in zip(works, stored, strict=True)]
 
 
 def _works(target, settings, options):
@@ -228,116 +214,3 @@ def pack_apart(targets: Sequence[Target], options: MeshOptions, context: bpy.typ
         for obj, group in itertools.groupby(works, key=lambda work: work.target.obj):
             corners, uvs = zip(*((work.island.corners, work.corner_uv) for work in group), strict=True)
             mesh_arrays.write(obj, np.concatenate(corners), np.concatenate(uvs))
-
-
-class _Seen(NamedTuple):
-    """An island as Blender will store it, rounded where it lies now."""
-
-    uv: np.ndarray  # (n, 2)
-    sign: np.ndarray  # (t,) the orientation of the triangles that Blender draws
-    is_injective: bool  # but for triangles without area, and without any contact
-
-
-def _seen(works):
-    uvs = _stored_uvs(works)
-    uv, triangles, first, triangle_starts = joined(uvs, [work.drawn for work in works])
-    sign = orientation(uv, triangles)
-    loops = [loop + start for work, start in zip(works, first, strict=True) for loop in work.loops]
-    loop_piece = np.repeat(np.arange(len(works)), [len(work.loops) for work in works])
-    solid = sign != 0  # those without area do not count, unless they should have some
-    piece = numbers(triangle_starts, len(triangles))
-    certified = are_injective(uv, triangles[solid], piece[solid], loops, loop_piece)
-    return [_Seen(*each) for each in zip(uvs, np.split(sign, triangle_starts[1:]), certified.tolist(), strict=True)]
-
-
-def _judge(works):
-    """Say what there is to say of the UVs that Blender will store, and of the triangles that it draws; what only
-    rounding spoils is mended first."""
-    if not works:
-        return
-    seen = _seen(works)
-    mended = [k for k, each in enumerate(seen) if not each.is_injective and _opened(works[k])]
-    if mended:
-        for k, each in zip(mended, _seen([works[k] for k in mended]), strict=True):
-            seen[k] = each
-    for work, (uv, sign, is_injective) in zip(works, seen, strict=True):
-        outcome = work.outcome
-        if work.is_redrawn or not np.array_equal(sign, outcome.after.triangle_orientation):
-            outcome.after = distortion(work.vertices, work.triangles, uv * work.aspect)
-        if work.is_redrawn:
-            _judge_drawn(work, sign)
-        if work.island.doubled_faces:
-            _judge_doubled(work, orientation(uv, work.doubled))
-        outcome.injective = not (outcome.after.flips or outcome.after.collapsed or (sign < 0).any())
-        if outcome.injective and not is_injective:
-            outcome.injective = touches_along_seams_only(uv, work.loops, work.place)
-            if outcome.injective:
-                outcome.warnings += ("it touches itself along a seam, and covers nothing twice",)
-
-
-def _opened(work):
-    """Whether an island that only rounding spoils, where it was placed, could be changed so that it is certified there:
-    its outline is closed where both sides of a seam lie on each other, or opened where they do not."""
-    if _closed(work):
-        return True
-    if not work.certified:
-        return False
-    seen = (-1, 1) if work.mirrored else (1, 1)
-    surface, uv, held = Surface(work.vertices, work.triangles), work.uv * seen, work.held
-    opened, done = unfolded_in_air(surface, uv, held, triangulate)
-    if not done:
-        opened, (done,) = unfolded(surface, uv, held, _ROUNDED)
-    if done:
-        work.uv = opened * seen
-    return bool(done)
-
-
-def _closed(work):
-    """Whether it is certified once vertices on both sides of a seam have the very same UVs, where rounding alone keeps
-    them apart; then they have."""
-    uv = work.uv
-    rim = np.concatenate(work.loops)
-    rim = rim[~work.held[rim].any(axis=1)]
-    place = work.place
-    order = rim[np.argsort(place[rim], kind="stable")]
-    first = order[np.searchsorted(place[order], place[order])]
-    near = _SAME * np.ptp(uv, axis=0).max() + 4 * np.finfo(np.float32).eps * np.abs(uv).max()
-    apart = np.abs(uv[order] - uv[first]).max(axis=1)
-    joined_up = (apart <= near) & (apart > 0)
-    if not joined_up.any():
-        return False
-    work.uv = uv.copy()
-    work.uv[order[joined_up]] = uv[first[joined_up]]
-    (stored,) = _stored_uvs([work])
-    sign = orientation(stored, work.triangles)
-    if (sign > 0).all() and touches_along_seams_only(stored, work.loops, place):
-        return True
-    work.uv = uv
-    return False
-
-
-def _judge_drawn(work, sign):
-    """Count the flips and collapses of an island's faces in the triangles that Blender draws."""
-    flips, collapsed = _wrong(work, work.drawn, sign)
-    work.outcome.after = dataclasses.replace(work.outcome.after, flips=flips, collapsed=collapsed)
-    if flips or collapsed:
-        work.outcome.warnings += (
-            "Blender cuts some of its neighbouring faces along the same diagonal: triangulate them",
-        )
-
-
-def _judge_doubled(work, sign):
-    """Add the flips and collapses of doubled faces, which Blender may cut into other triangles than their twins."""
-    after = work.outcome.after
-    flips, collapsed = _wrong(work, work.doubled, sign)
-    work.outcome.after = dataclasses.replace(after, flips=after.flips + flips, collapsed=after.collapsed + collapsed)
-    if flips or collapsed:
-        work.outcome.warnings += (
-            "Blender cuts doubled faces otherwise than their twins: delete the doubles, or triangulate both",
-        )
-
-
-def _wrong(work, triangles, sign):
-    """How many of an island's triangles (t, 3) are flipped and how many collapsed, by their orientations (t,)."""
-    has_area = areas_in_space(work.vertices, triangles) > 0
-    return int((sign < 0).sum()), int(((sign == 0) & has_area).sum())

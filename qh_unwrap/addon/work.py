@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of an island while it is unwrapped."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..core import Settings, placing
 from ..core.islands import Island
+from ..core.triangles import corners_of, signed_areas
 from . import mesh_arrays
 from .outcome import Outcome
 from .selection import Target
@@ -77,6 +78,18 @@ class Work:
         pinned = self.mesh.pinned[self._corners]
         source[self._corner_vertex[pinned]] = self._corners[pinned]
         return source
+
+    @property
+    def can_stay(self):
+        """Whether its old UVs, if they are valid, are better than new ones that are not."""
+        settings = self.settings
+        improves = settings.repair and (settings.iterations or settings.refine)
+        return bool(improves and self.old_uv is not None and not self.is_fresh and not self.is_cut)
+
+    def as_before(self):
+        """The same with the old UVs for new ones."""
+        mirrored = signed_areas(corners_of(self.old_uv, self.triangles)).sum() < 0
+        return replace(self, uv=self.old_uv, mirrored=bool(mirrored))
 
     @cached_property
     def old_triangles(self):

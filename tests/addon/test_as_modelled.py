@@ -318,3 +318,19 @@ def test_what_ends_with_flips_has_a_word():
     _, (report,) = unwrapped(points, faces)
     assert report["injective"] or any("mark a seam along it" in text for text in report["warnings"])
     assert report["injective"] or report["after"]["flips"]
+
+
+def test_a_map_that_covers_nothing_twice_is_not_given_up_for_one_that_does():
+    points = [(1, 0, 0), (0.3, 1, 0), (-1, 0.6, 0), (-1, 0.8, 2), (0, -1, 2), (1, 0, 4), (0.4, -1, 4), (0, 1, 6)]
+    faces = [(0, 7, 1), (1, 7, 3, 2), (2, 3, 4), (4, 7, 0), (4, 3, 6), (4, 6, 5, 7)]
+    rough = dict(iterations=20, refine=0)
+    _, (report,) = unwrapped(points, faces, **rough)
+    assert not report["injective"], "it is a case in point"
+    obj, (report,) = unwrapped(points, faces)
+    assert report["injective"]
+    before = uvs(obj)
+    obj, (report,) = unwrapped(points, faces, before, **rough)
+    assert report["injective"] and "stay as they were" in report["warnings"][-1]
+    np.testing.assert_allclose(uvs(obj), before, atol=1e-6)
+    obj, _ = unwrapped(points, faces, before, **rough, repair=False)
+    assert not np.allclose(uvs(obj), before, atol=0.1), "which is wanted as it comes"
