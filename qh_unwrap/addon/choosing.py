@@ -63,9 +63,10 @@ def choose(objects=None, collections=None):
         _require(objects, [obj.name for obj in candidates], "mesh object")
         candidates = [obj for obj in candidates if _fits(obj.name, objects)]
 
-    chosen, reasons = [], {}
+    chosen, reasons, shapes = [], {}, _custom_shapes()
     for obj in candidates:
-        reason = _reason_against(obj, named=objects and obj.name in objects)
+        named = objects and obj.name in objects
+        reason = _reason_against(obj, named) or (_SHAPE if obj in shapes and not named else None)
         if reason:
             reasons[obj] = reason
         else:
@@ -91,6 +92,15 @@ def _reason_against(obj, named):
     if not obj.data.polygons:
         return "without faces"
     return None if named or obj.visible_get() else "hidden (--object with the whole name takes it all the same)"
+
+
+_SHAPE = "custom shape of a bone (--object with the whole name takes it all the same)"
+
+
+def _custom_shapes():
+    """The objects that some bone is drawn as: parts of a rig, not of a model."""
+    armatures = [obj for obj in bpy.data.objects if obj.pose]
+    return {bone.custom_shape for armature in armatures for bone in armature.pose.bones} - {None}
 
 
 def _is_instanced(obj):

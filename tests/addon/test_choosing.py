@@ -132,6 +132,32 @@ def test_hidden_objects_can_be_asked_for_by_name(run):
     assert unwrapped(run("--object", "Hidden")[1]) == ["Hidden"]
 
 
+@pytest.fixture
+def rigged():
+    """A panel, and a widget that a bone of a rig is drawn as."""
+    add_grid(2, "Panel")
+    widget = add_grid(2, "Widget")
+    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode='EDIT')
+    rig.data.edit_bones.new("Bone").tail = 0, 0, 1
+    bpy.ops.object.mode_set(mode='OBJECT')
+    rig.pose.bones["Bone"].custom_shape = widget
+
+
+@pytest.mark.parametrize("arguments", [(), ("--object", "*")])
+def test_custom_shapes_of_bones_are_skipped(run, rigged, arguments):
+    code, report = run(*arguments)
+    assert code == 0 and unwrapped(report) == ["Panel"]
+    (skipped,) = report["skipped"]
+    assert skipped["reason"].startswith("custom shape of a bone") and skipped["objects"] == ["Widget"]
+
+
+def test_custom_shapes_of_bones_can_be_asked_for_by_name(run, rigged):
+    assert unwrapped(run("--object", "Widget")[1]) == ["Widget"]
+
+
 def test_nothing_but_skipped_objects(run):
     add_grid(2, "Hidden").hide_set(True)
     code, report = run()
