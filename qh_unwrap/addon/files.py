@@ -1,75 +1,42 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mesh files in and out for the command line, by Blender's own importers and exporters."""
 
+import re
+from typing import NamedTuple
+
 import bpy
 
 from ..core.islands import cuts
-from . import checking, mesh_arrays, selection, suzanne, writing
+from . import checking, formats, mesh_arrays, modes, origin, selection, suzanne, takes, writing
 from .failures import FileError
+from .formats import READERS, WRITERS
 
 
-def _read_blend(filepath):
-    return bpy.ops.wm.open_mainfile(filepath=filepath, load_ui=False, use_scripts=False)
+class _Opened(NamedTuple):
+    """What is known of a file that `load` opened."""
+
+    scene: int  # the number of its scene, by which it is seen whether it is open still
+    origin: origin.Origin
+    left: modes.Left
 
 
-def _importer(operator, **options):
-    def read(filepath):
-        _new_scene()
-        return operator(filepath=filepath, **options)
-
-    return read
-
-
-def _new_scene():
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True, load_ui=False)
-
-
-_gltf = _importer(bpy.ops.import_scene.gltf)
-_usd = _importer(bpy.ops.wm.usd_import)
-
-READERS = {
-    ".blend": _read_blend,
-    ".obj": _importer(bpy.ops.wm.obj_import),
-    ".ply": _importer(bpy.ops.wm.ply_import),
-    ".stl": _importer(bpy.ops.wm.stl_import),
-    ".glb": _gltf,
-    ".gltf": _gltf,
-    ".fbx": _importer(bpy.ops.import_scene.fbx),
-    ".usd": _usd,
-    ".usda": _usd,
-    ".usdc": _usd,
-}
-
-
-def _exporter(operator, **options):
-    return lambda filepath: operator(filepath=filepath, **options)
-
-
-_usd = _exporter(bpy.ops.wm.usd_export, root_prim_path="")
-
-WRITERS = {
-    ".blend": _exporter(bpy.ops.wm.save_as_mainfile, copy=True),
-    ".obj": _exporter(bpy.ops.wm.obj_export, path_mode='ABSOLUTE'),
-    ".ply": _exporter(bpy.ops.wm.ply_export),
-    ".glb": _exporter(bpy.ops.export_scene.gltf, export_format='GLB'),
-    ".gltf": _exporter(bpy.ops.export_scene.gltf, export_format='GLTF_SEPARATE'),
-    ".fbx": _exporter(bpy.ops.export_scene.fbx),
-    ".usd": _usd,
-    ".usda": _usd,
-    ".usdc": _usd,
-}
+_opened = None
 
 
 def load(source):
     """Open the file (or make Blender's monkey) in place of what is open; returns the scene's meshes with faces."""
+    global _opened
     if source == "suzanne":
-        _new_scene()
+        formats.new_scene()
         suzanne.add()
+        found = origin.Origin()
     else:
+        found = origin.of(source)
         _require_finished(READERS[source.suffix.lower()](str(source.absolute())))
-    if bpy.context.mode != 'OBJECT':
-        bpy.ops.object.mode_set(mode='OBJECT')
+        if found.suffix == ".fbx" and bpy.data.actions:
+            found = found._replace(takes=tuple(takes.names(str(source))))
     bpy.context.view_layer.update()
+    _opened = _Opened(bpy.context.scene.session_uid, found, modes.leave(bpy.context.view_layer))
     return [obj for obj in selection.distinct_meshes(bpy.context.scene.objects) if obj.data.polygons]
 
 
@@ -92,15 +59,29 @@ def save(path):
 def stage(staging, path):
     """Write everything to a new file that waits in `staging` for the place of `path`."""
     suffix = path.suffix.lower()
+    opened = _opened if _opened and _opened.scene == bpy.context.scene.session_uid else None
+    formats.prepare(suffix, opened.origin if opened else origin.Origin())
     expected = checking.content()
 
     def write(temporary):
+        if opened and suffix == ".blend":
+            modes.come_back(opened.left)
         _require_finished(WRITERS[suffix](str(temporary)))
+        if suffix == ".obj":
+            _mend_paths(temporary.with_suffix(".mtl"))
 
     def check(file):
         checking.check(file, expected if file.suffix.lower() == suffix else None)
 
-    staging.write(path, write, check, beside=suffix == ".blend")  # where paths are relative to its folder
+    staging.write(path, write, check, beside=formats.is_single(suffix))
+
+
+def _mend_paths(materials):
+    """Have the relative paths of pictures begin at the folder where the file will be, one above that where it waits."""
+    if materials.exists():
+        text = materials.read_text(encoding="utf-8", errors="surrogateescape")
+        text = re.sub(r"^(map_.*? |bump .*?|refl .*?|norm .*?)\.\.[/\\]", r"\1", text, flags=re.MULTILINE)
+        materials.write_text(text, encoding="utf-8", errors="surrogateescape")
 
 
 def _require_finished(result):

@@ -6,6 +6,7 @@ import json
 import bpy
 import numpy as np
 import pytest
+import rich
 from scenes import add_grid, uvs
 
 from qh_unwrap.addon import files
@@ -156,6 +157,16 @@ def test_custom_shapes_of_bones_are_skipped(run, rigged, arguments):
 
 def test_custom_shapes_of_bones_can_be_asked_for_by_name(run, rigged):
     assert unwrapped(run("--object", "Widget")[1]) == ["Widget"]
+
+
+def test_importing_a_skin_makes_no_meshes_of_its_bones(run, tmp_path):
+    (tmp_path / "skin").mkdir()
+    rich.make(tmp_path / "skin")
+    rich.write(tmp_path / "in.glb")
+    files.load(tmp_path / "in.glb")
+    code, report = run("--weld", suffix=".glb")
+    assert code == 0 and unwrapped(report) == ["Haut", "Eins"] and not report["skipped"]
+    assert sorted(mesh.name for mesh in bpy.data.meshes) == ["Grid", "Haut"]
 
 
 def test_nothing_but_skipped_objects(run):
