@@ -159,8 +159,9 @@ def _run(args, record, progress):
     _check_formats(args, files, preview)
     _keep(args, record)  # which says that the run is not finished, in place of what an earlier one said
     record.begin("read")
-    with _at_file("read", args.input):
+    with _at_file("read", args.input, record):
         files.load(args.input)
+    record.warn(files.missing_pictures())
     choice = choosing.choose(args.object, args.collection)
     record.skipped = choice.skipped
     objects = choice.required()
@@ -190,7 +191,7 @@ def _run(args, record, progress):
 
 
 def _write(args, record, maps, targets, options):
-    from .addon import checking, files, preview
+    from .addon import checking, files, losses, preview
 
     named = {outcome.obj for outcome in record.done}
     done = {target.obj for target in targets if target.obj.name in named}
@@ -200,15 +201,16 @@ def _write(args, record, maps, targets, options):
 
     with writing.Staging(overwrite=args.overwrite) as staging:
         if args.preview:
-            with _at_file("write", args.preview):
+            with _at_file("write", args.preview, record):
                 staging.write(args.preview, draw, checking.check_image)
         if args.output:
-            if args.output.suffix.lower() not in files.ONE_MAP:  # of which the active one is that with the new UVs
+            if args.output.suffix.lower() not in losses.ONE_MAP:  # of which the active one is that with the new UVs
                 maps.restore(done)
-            with _at_file("write", args.output):
+            record.losses = losses.of(args.output)
+            with _at_file("write", args.output, record):
                 files.stage(staging, args.output)
         try:
-            with _at_file("write", args.output or args.preview):
+            with _at_file("write", args.output or args.preview, record):
                 staging.put_in_place()
         finally:
             record.files = staging.placed
@@ -236,21 +238,23 @@ def _show(args, record):
     else:
         is_written = record.exit_code in (OK, PARTIAL)
         told = record.outcomes if is_written or not record.done else []
-        skipped = record.skipped_sentences() if is_written else []
-        console.show_outcomes(told, skipped, verbose=args.verbose, quiet=args.quiet)
+        others = record.sentences() if is_written else record.warning_sentences()
+        console.show_outcomes(told, others, verbose=args.verbose, quiet=args.quiet)
     if record.error:
         console.show(f"qh-unwrap: error: {record.error}", error=True)
 
 
 @contextmanager
-def _at_file(verb, path):
+def _at_file(verb, path, record):
+    told = []
     try:
-        with streams.quiet(errors=True):
+        with streams.quiet(told):
             yield
     except (RuntimeError, OSError, FileError) as error:
         stopping.check()
         is_full = verb == "write" and writing.is_full(path)  # which Blender does not always say
         raise FileError(f"cannot {verb} {path}: {_reason(error)}{' (the disk is full)' if is_full else ''}") from error
+    record.warn(told)
 
 
 def _reason(error):

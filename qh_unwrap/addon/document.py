@@ -30,6 +30,8 @@ class Record:
         self.outcomes = []
         self.places = []  # of every outcome its mesh, map and materials, as a dictionary
         self.skipped = {}  # names of objects by the reason
+        self.warnings = []  # what Blender says of the files
+        self.losses = []  # what the format of the output does not hold: `losses.Loss`
         self.files = []
         self.is_kept = False  # in a file, for the time being
         self.exit_code = None
@@ -66,9 +68,16 @@ class Record:
         else:
             self.exit_code = PARTIAL if self.failed else OK
 
-    def skipped_sentences(self):
-        """A line for each reason."""
-        return [f"skipped: {words.told_of(reason, names)}" for reason, names in self.skipped.items()]
+    def warn(self, texts):
+        self.warnings += [text for text in texts if text not in self.warnings]
+
+    def warning_sentences(self):
+        return [f"Blender warns: {text}" for text in self.warnings]
+
+    def sentences(self):
+        """A line for each reason to skip objects, for each kind of what is not written, and for each warning."""
+        skipped = [f"skipped: {words.told_of(reason, names)}" for reason, names in self.skipped.items()]
+        return [*skipped, *(loss.message for loss in self.losses), *self.warning_sentences()]
 
     def to_dict(self):
         """JSON-ready; what is infinite, as the energy of flipped faces, is None, since JSON knows no such number."""
@@ -104,6 +113,8 @@ class Record:
                 faces=sum(outcome.faces for outcome in self.outcomes),
             ),
             skipped=[dict(reason=reason, objects=names) for reason, names in self.skipped.items()],
+            not_written=[loss._asdict() for loss in self.losses],
+            warnings=self.warnings,
             islands=self._islands(),
         )
 

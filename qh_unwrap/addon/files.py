@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mesh files in and out for the command line, by Blender's own importers and exporters."""
 
+import os
 import re
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ from ..core.islands import cuts
 from . import checking, formats, mesh_arrays, modes, origin, selection, suzanne, takes, writing
 from .failures import FileError
 from .formats import READERS, WRITERS
+from .outcome import count, listed
 
 
 class _Opened(NamedTuple):
@@ -90,7 +92,12 @@ def _require_finished(result):
         raise FileError("Blender gave up")
 
 
-ONE_MAP = (".obj", ".ply")  # what holds a single UV map, which is the active one
+def missing_pictures():
+    """A sentence, if pictures that the open file refers to are not where it says: Blender warns of few of them."""
+    pictures = [image for image in bpy.data.images if image.source == 'FILE' and image.users and not image.packed_file]
+    paths = [bpy.path.abspath(image.filepath, library=image.library) for image in pictures]
+    names = sorted({os.path.basename(path) for path in paths if path and not os.path.exists(path)})
+    return [f"{count(len(names), 'picture')} not found: {listed(names)}"] if names else []
 
 
 def likely_size(path, source, objects):

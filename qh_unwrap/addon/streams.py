@@ -2,42 +2,70 @@
 """The standard streams, into which Blender prints as well; needs no Blender."""
 
 import ctypes
+import gc
 import os
 import re
-import sys
 import tempfile
-from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from functools import cache
 
 from . import stopping
 
-_MATTERS = re.compile(r"warning|error", re.IGNORECASE)
+_WARNING = re.compile(
+    r"""^(?:[\d:.]+\s+)?(?:[\w.]+\s+)?(?:\|\s*)?  # when, and who, in some versions of Blender and of its add-ons
+    (?:WARN(?:ING)?|Warning|ERROR|\w*Error|(?=Cannot\ load))(?:\ \([\w.]+\))?:?\s*
+    (?:in\ \w+\ at\ line\ \d+\ of\ \S+\ --\ |\S+:\d+\ \w+:\ )?  # where in the source
+    (?P<text>.+)""",
+    re.VERBOSE,
+)
+_OF_THE_PLACE = re.compile("Draco|MeshOptimizer|CUEW|HIPEW")  # libraries that may be missing, and are not needed
 
 
 @contextmanager
-def quiet(errors=False):
+def quiet(told=None):
     """Keep what Blender prints from the standard output, which is for the table alone.
 
-    errors   keep it from the standard error, too; warnings and errors among it follow later, unless there is an
-             exception, which says it better
+    told     a list: keep it from the standard error, too, and append the warnings and errors among it, each once; not
+             if there is an exception, which says it better
     """
     open_standard_streams()
     library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)  # Blender prints through a buffer of C, too
     with ExitStack() as stack:
-        nowhere = stack.enter_context(open(os.devnull, "w"))
-        later = stack.enter_context(tempfile.TemporaryFile("w+", errors="replace")) if errors else None
-        with _redirected(library, 1, nowhere), redirect_stdout(nowhere):
-            if later is None:
+        if told is None:
+            nowhere = stack.enter_context(open(os.devnull, "w"))
+            with _redirected(library, 1, nowhere), redirect_stdout(nowhere):
                 yield
-                return
-            with _redirected(library, 2, later), redirect_stderr(_stream_2()):
+            return
+        said = [stack.enter_context(_scratch()) for _ in range(2)]
+        with (
+            _redirected(library, 1, said[0]),
+            _redirected(library, 2, said[1]),
+            redirect_stdout(_stream_2()),
+            redirect_stderr(_stream_2()),
+        ):
+            try:
                 yield
+            except BaseException:
+                gc.collect()  # else a file that could not be closed complains when the output is seen again
+                raise
         stopping.check()  # what Blender may have printed as an error of a handler
-        later.seek(0)
-        with suppress(OSError, ValueError):  # of a stream that is closed
-            for line in later:
-                if sys.stderr is not None and _MATTERS.search(line):
-                    sys.stderr.write(line)
+        for file in said:
+            file.seek(0)
+        told += warnings(line for file in said for line in file)
+
+
+def _scratch():
+    """A file without a name: in memory, if the system has such, since Pixar's library aborts if it cannot say that the
+    disk is full."""
+    if hasattr(os, "memfd_create"):
+        return open(os.memfd_create("said"), "w+", errors="replace")
+    return tempfile.TemporaryFile("w+", errors="replace")
+
+
+def warnings(lines):
+    """What the lines warn of, each once, without when and where that was found."""
+    found = [match["text"].strip() for match in map(_WARNING.match, lines) if match]
+    return list(dict.fromkeys(text for text in found if not _OF_THE_PLACE.search(text)))
 
 
 @cache
