@@ -165,7 +165,7 @@ def _write_usd(filepath):
         rename_uvmaps=not is_usd,
         convert_orientation=is_usd and origin.y_up,
         convert_scene_units='CUSTOM',
-        meters_per_unit=origin.metres,
+        meters_per_unit=origin.metres if is_usd else 1.0,
         export_textures=_has_packed_images(),  # as files beside it; pictures that are files already stay where they are
         export_textures_mode='NEW' if _has_packed_images() else 'KEEP',  # the same from Blender 4.5 on
     )
@@ -174,17 +174,29 @@ def _write_usd(filepath):
 def _write_fbx(filepath):
     origin = _Open.origin
     is_packed = _has_packed_images()
+    is_in_metres = origin.suffix == ".fbx" and origin.metres == 1
     with takes.arranged(origin.takes) if origin.takes else nullcontext():
         return _run(
             bpy.ops.export_scene.fbx,
             filepath,
             use_custom_props=True,
             add_leaf_bones=False,
+            apply_scale_options='FBX_SCALE_UNITS' if is_in_metres else 'FBX_SCALE_NONE',
+            **_axes(origin.axes),
             bake_anim_use_all_actions=not origin.takes,
             bake_anim_simplify_factor=0.01 if origin.takes else 1.0,
             path_mode='COPY' if is_packed else 'RELATIVE',
             embed_textures=is_packed,
         )
+
+
+def _axes(numbers):
+    """The exporter's options for the axes that stand in a .fbx file, if it knows them."""
+    from io_scene_fbx.fbx_utils import RIGHT_HAND_AXES  # comes with Blender
+
+    pairs = tuple(zip(numbers[::2], numbers[1::2], strict=True))
+    names = next((names for names, known in RIGHT_HAND_AXES.items() if known == pairs), None)
+    return dict(axis_up=names[0], axis_forward=names[1]) if names else {}
 
 
 def _has_packed_images():

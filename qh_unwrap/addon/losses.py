@@ -29,6 +29,7 @@ def of(path):
             if names:
                 is_one = "is" if len(names) == 1 else "are"
                 found.append(Loss(kind, names, f"{path.name} holds no {kind}: {listed(names)} {is_one} not written"))
+    found += [_hidden(path)]
     found += [_triangles(path, meshes)] if suffix in (".glb", ".gltf") else []
     return [loss for loss in found if loss.names]
 
@@ -53,6 +54,23 @@ def _maps(path, meshes):
         verbs = ("is" if len(names) == 1 else "are" for names in (written, lost))
         what = f"{listed(written)} {next(verbs)} written, {listed(lost)} {next(verbs)} not"
     return Loss("UV maps", lost, f"{path.name} holds one UV map: {what}")
+
+
+_HIDDEN = {  # what exporters leave out
+    ".obj": lambda obj: not obj.visible_get(),
+    ".ply": lambda obj: not obj.visible_get(),
+    ".fbx": lambda obj: obj.name not in bpy.context.view_layer.objects,
+    **dict.fromkeys(
+        (".usd", ".usda", ".usdc"), lambda obj: obj.hide_render or obj.name not in bpy.context.view_layer.objects
+    ),
+}
+
+
+def _hidden(path):
+    is_hidden = _HIDDEN.get(path.suffix.lower(), lambda _: False)
+    names = [obj.name for obj in _objects() if obj.type == 'MESH' and is_hidden(obj)]
+    verb = "is" if len(names) == 1 else "are"
+    return Loss("hidden objects", names, f"{path.name} holds no hidden objects: {listed(names)} {verb} not written")
 
 
 def _triangles(path, meshes):

@@ -3,6 +3,7 @@
 
 import json
 import re
+import struct
 from pathlib import PurePosixPath
 from typing import NamedTuple
 from urllib.parse import unquote
@@ -19,6 +20,7 @@ class Origin(NamedTuple):
     default_prim: str | None = None  # what other .usd files get that refer to this one
     y_up: bool = False
     metres: float = 1.0  # in a unit
+    axes: tuple = ()  # UpAxis, its sign, FrontAxis, its sign, CoordAxis and its sign, in .fbx
     takes: tuple = ()  # the names of them
     pictures: str = ""  # the folder that they are in
 
@@ -31,9 +33,25 @@ def of(source):
             return Origin(suffix, compressed=file.read(4).startswith(_COMPRESSED))
     if suffix in (".usd", ".usda", ".usdc"):
         return Origin(suffix, **_stage(source))
+    if suffix == ".fbx":
+        return Origin(suffix, **_settings(source))
     if suffix == ".gltf":
         return Origin(suffix, pictures=_folder_of_pictures(source))
     return Origin(suffix)
+
+
+def _settings(source):
+    """The unit and the axes of a binary .fbx file, which stand near its beginning."""
+    with source.open("rb") as file:
+        head = file.read(_HEAD)
+    unit = re.search(rb"UnitScaleFactorS.{4}doubleS.{4}NumberS.{4}D(.{8})", head, re.DOTALL)
+    numbers = []
+    for name in (b"Up", b"Front", b"Coord"):
+        for kind in (b"", b"Sign"):
+            found = re.search(rb"\x00%sAxis%sS.{4}intS.{4}IntegerS.{4}I(.{4})" % (name, kind), head, re.DOTALL)
+            numbers += struct.unpack("<i", found[1]) if found else ()
+    centimetres = struct.unpack("<d", unit[1])[0] if unit else 1.0
+    return dict(metres=centimetres / 100, axes=tuple(numbers) if len(numbers) == 6 else ())
 
 
 def _folder_of_pictures(source):

@@ -80,6 +80,27 @@ def test_names_are_told(run, source):
     assert found["animation"]["names"] == ["Fahrt", "Wachsen", "Winken"]
 
 
+def test_hidden_objects(run, tmp_path):
+    add_grid(2, "Plain")
+    add_grid(2, "Hidden").hide_set(True)
+    add_grid(2, "Unseen").hide_render = True
+    add_grid(2, "Apart")
+    apart = bpy.data.collections.new("Apart")
+    bpy.context.scene.collection.children.link(apart)
+    bpy.context.collection.objects.unlink(bpy.data.objects["Apart"])
+    apart.objects.link(bpy.data.objects["Apart"])
+    bpy.context.view_layer.layer_collection.children["Apart"].exclude = True
+    files.save(tmp_path / "in.blend")
+    for suffix, names in ((".obj", "Hidden Apart"), (".fbx", "Apart"), (".usda", "Unseen Apart"), (".glb", "")):
+        report, _ = run(tmp_path / "in.blend", f"a{suffix}")
+        found = [loss["names"] for loss in report["not_written"] if loss["kind"] == "hidden objects"]
+        assert found == ([names.split()] if names else []), suffix
+        if suffix != ".usda":  # where the names of meshes come back
+            rich.read(tmp_path / f"a{suffix}")
+            written = {obj.name for obj in bpy.data.objects}
+            assert written == {"Plain", "Hidden", "Unseen", "Apart"} - set(names.split()), suffix
+
+
 def test_modifiers_that_stay_behind(run, tmp_path):
     add_grid(2).modifiers.new("Round", 'SUBSURF')
     files.save(tmp_path / "in.blend")

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import rich
 from everything import differences, everything, f_curves
-from scenes import add_grid, uvs
+from scenes import add_grid, changes, snapshot, uvs
 
+from qh_unwrap.addon import origin
 from qh_unwrap.cli import main
 
 
@@ -94,6 +95,18 @@ def test_takes_of_fbx(folder):
     assert all(np.allclose(before[key], after[key], atol=2e-3) for key in before)
 
 
+@pytest.mark.parametrize("up", ['Y', 'Z'])
+@pytest.mark.parametrize("unit", ['FBX_SCALE_NONE', 'FBX_SCALE_UNITS'])
+def test_unit_and_axes_of_fbx(folder, up, unit):
+    add_grid(2).scale = 1, 2, 3
+    source, forward = folder / "in.fbx", '-Z' if up == 'Y' else 'Y'
+    bpy.ops.export_scene.fbx(filepath=str(source), apply_scale_options=unit, axis_up=up, axis_forward=forward)
+    target = through(source)
+    assert compared(source, target) == []
+    assert origin.of(source) == origin.of(target)
+    assert origin.of(target).metres == (1 if unit == 'FBX_SCALE_UNITS' else 0.01) and len(origin.of(target).axes) == 6
+
+
 def test_uv_maps(folder):
     for suffix in (".glb", ".usda", ".fbx"):
         rich.make(folder)
@@ -154,6 +167,23 @@ def interface():
         selected=sorted(obj.name for obj in layer.objects.selected),
         active=layer.objects.active.name,
     )
+
+
+@pytest.mark.parametrize("mode", ['OBJECT', 'EDIT'])
+def test_meshes_are_as_they_were(folder, mode):
+    """Every array of the mesh, those of selection and seams as well."""
+    rich.make(folder)
+    obj = bpy.data.objects["Haut"]
+    obj.data.edges[3].use_seam = obj.data.edges[5].use_edge_sharp = True
+    obj.data.polygons[2].hide = True
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode=mode)
+    save(folder / "in.blend")
+    found = []
+    for path in (folder / "in.blend", through(folder / "in.blend")):
+        rich.read(path)
+        found.append([snapshot(bpy.data.objects[name]) for name in ("Haut", "Eins")])
+    assert [changes(*pair) for pair in zip(*found, strict=True)] == [{"UVMap"}, {"UVMap"}]
 
 
 @pytest.mark.parametrize("compress", [True, False])

@@ -6,6 +6,9 @@ import logging
 import os
 import signal
 import stat
+import subprocess
+import sys
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -260,3 +263,27 @@ def test_signals_leave_nothing(source, folder, capfd, monkeypatch, when, number,
         assert sorted(contents(folder)) == ["out.bin", "out.gltf"] and target.read_bytes() != b"old"
     else:
         assert contents(folder) == {"out.gltf": b"old"}
+
+
+def test_signals_at_any_time_leave_the_original_or_the_result(source):
+    """A program of its own that replaces its input.  While Python itself starts and ends, a signal just kills it."""
+    before, length = contents(source.parent), None
+    for number, share in ((None, None), (signal.SIGINT, 0.3), (signal.SIGTERM, 0.6)):
+        start = time.perf_counter()
+        process = subprocess.Popen(
+            [sys.executable, "-m", "qh_unwrap", source, "-o", source, "--overwrite"],
+            cwd=Path(__file__).parents[2],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+        if number:
+            time.sleep(share * length)
+            process.send_signal(number)
+        _, errors = process.communicate(timeout=60)
+        length = length or time.perf_counter() - start
+        after = contents(source.parent)
+        assert after.keys() == before.keys() and b"Traceback" not in errors
+        assert process.returncode in ((0, 128 + number, -number) if number else (0,))
+        if process.returncode > 0:
+            assert after == before
+        before = after
