@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's importers and exporters, with the options with which they lose the least."""
 
-import re
 from contextlib import nullcontext
 
 import bpy
@@ -159,15 +158,15 @@ def _write_usd(filepath):
     return _run(
         bpy.ops.wm.usd_export,
         filepath,
-        root_prim_path=f"/{re.sub(r'[^0-9A-Za-z_]', '_', origin.default_prim or 'root')}",  # holds the materials, too
+        root_prim_path=f"/{origin.default_prim or 'root'}",  # holds the materials, too
         export_animation=curves.is_animated(),
         allow_unicode=True,
         rename_uvmaps=not is_usd,
         convert_orientation=is_usd and origin.y_up,
         convert_scene_units='CUSTOM',
         meters_per_unit=origin.metres if is_usd else 1.0,
-        export_textures=_has_packed_images(),  # as files beside it; pictures that are files already stay where they are
-        export_textures_mode='NEW' if _has_packed_images() else 'KEEP',  # the same from Blender 4.5 on
+        export_textures=not _is_single_usd(),  # else pictures stay where they are
+        export_textures_mode='KEEP' if _is_single_usd() else 'NEW',  # the same from Blender 4.5 on
     )
 
 
@@ -222,4 +221,9 @@ WRITERS = {
 
 def is_single(suffix):
     """Whether the open file, written in this format, is a single file in which paths are relative to its folder."""
-    return suffix in (".blend", ".fbx") or (suffix in _USD and not _has_packed_images())
+    return suffix in (".blend", ".fbx") or (suffix in _USD and _is_single_usd())
+
+
+def _is_single_usd():
+    """Whether no pictures are written beside it: those that are no files yet, and one for the color of the world."""
+    return not (_has_packed_images() or bpy.context.scene.world)

@@ -54,15 +54,19 @@ def test_usd(folder):
     source = folder / "in.usda"
     rich.write(source)
     found = compared(source, through(source))
-    names = re.compile(r"(Eins|Grid|Rig)[._]001")  # prims of one name have a number from now on
-    assert [path for path in found if not names.search(path) and path not in _RENAMED] == []
+    expected = "|".join(
+        (
+            r"(Eins|Grid|Rig)[._]001",  # prims of one name have a number from now on
+            r"\['of_a_material'\]",  # which Blender cannot read of some materials of an animated file
+        )
+    )
+    assert [path for path in found if not re.search(expected, path) and path not in _RENAMED] == []
 
 
 _RENAMED = (  # what refers to them
     "objects[Haut].parent",
     "objects[Rig].parent",
     "objects[Leer].constraints[Transform Cache].cache_file",
-    *(("materials[木材]['of_a_material']",) if bpy.app.version < (4, 5, 0) else ()),  # which has them only in part
 )
 
 
@@ -277,6 +281,11 @@ def test_default_prim_holds_all_and_is_the_same(folder):
     assert [slot.name for slot in obj.material_slots] == ["Red"]
 
 
+def test_default_prim_that_is_not_latin(folder):
+    (folder / "in.usda").write_text(_MODEL.replace("Model", "模型"), encoding="utf-8")
+    assert 'defaultPrim = "模型"' in through(folder / "in.usda").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("suffix", [".obj", ".blend"])
 def test_subdivision_surfaces_of_usd_are_not_subdivided_elsewhere(folder, suffix):
     (folder / "in.usda").write_text(_MODEL)
@@ -348,6 +357,24 @@ def test_paths_of_pictures_are_relative(folder, suffix, where):
     rich.read(target)
     (image,) = [image for image in bpy.data.images if image.name.startswith("bricks")]
     assert bpy.path.abspath(image.filepath).endswith("bricks.png") and image.size[0] == 4
+
+
+def test_pictures_that_the_usd_exporter_makes_are_not_overwritten(folder):
+    rich.make(folder)
+    bpy.context.scene.world = bpy.data.worlds.new("Grey")
+    bpy.context.scene.world.use_nodes = True
+    rich.write(folder / "in.blend")
+    (folder / "out").mkdir()
+    arguments = [str(folder / "in.blend"), "-o", str(folder / "out" / "out.usda"), "--object", "Eins"]
+    assert main(arguments) == 0
+    made = sorted((folder / "out" / "textures").iterdir())
+    assert len(made) == 2, "the color of the world, and the picture"
+    for path in made:
+        path.write_text("somebody else's")
+    (folder / "out" / "out.usda").unlink()
+    assert main(arguments) == 3
+    assert [path.read_text() for path in made] == ["somebody else's"] * 2
+    assert not (folder / "out" / "out.usda").exists()
 
 
 def test_pictures_within_fbx(folder):
