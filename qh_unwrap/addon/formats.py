@@ -174,7 +174,8 @@ def _write_fbx(filepath):
     origin = _Open.origin
     is_packed = _has_packed_images()
     is_in_metres = origin.suffix == ".fbx" and origin.metres == 1
-    with takes.arranged(origin.takes) if origin.takes else nullcontext():
+    scenes = takes.sorted_out(origin.takes)
+    with takes.arranged(scenes) if scenes else nullcontext():
         return _run(
             bpy.ops.export_scene.fbx,
             filepath,
@@ -182,8 +183,8 @@ def _write_fbx(filepath):
             add_leaf_bones=False,
             apply_scale_options='FBX_SCALE_UNITS' if is_in_metres else 'FBX_SCALE_NONE',
             **_axes(origin.axes),
-            bake_anim_use_all_actions=not origin.takes,
-            bake_anim_simplify_factor=0.01 if origin.takes else 1.0,
+            bake_anim_use_all_actions=not scenes,
+            bake_anim_simplify_factor=0.01 if scenes else 1.0,
             path_mode='COPY' if is_packed else 'RELATIVE',
             embed_textures=is_packed,
         )

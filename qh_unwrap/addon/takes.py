@@ -4,6 +4,7 @@
 Blender's exporter would make a take of each action on each object that could have it, and name it after both.
 """
 
+import re
 from contextlib import contextmanager
 
 import bpy
@@ -11,6 +12,7 @@ import bpy
 from . import curves
 
 _LONGEST = 63  # bytes, of a name in Blender
+_NUMBER = re.compile(r"\.\d{3}$")
 
 
 def names(filepath):
@@ -23,19 +25,27 @@ def names(filepath):
     return [text.partition(b"\x00\x01")[0].decode("utf-8", "replace") for text in texts]
 
 
+def sorted_out(takes):
+    """{take: {owner: action}} of all actions; empty if they are not to be told apart by their names."""
+    owners = _animated()
+    found = {take: _actions(take, owners) for take in takes}
+    actions = [action for each in found.values() for action in each.values()]
+    if len(actions) != len(set(actions)) or set(actions) != set(bpy.data.actions):
+        return {}
+    return {take: each for take, each in found.items() if each}
+
+
 @contextmanager
-def arranged(takes):
-    """While an exporter bakes a take for each strip of the NLA: one strip for each of these takes.
+def arranged(scenes):
+    """While an exporter bakes a take for each strip of the NLA: one strip for each take of `sorted_out`.
 
     It stands for all actions of the take, which are given to what they animate as long as the strip is the one that is
     not muted.
     """
     owners = _animated()
     before = {owner: owner.animation_data.action for owner in owners}
-    scenes = {take: _actions(take, owners) for take in takes}
-    scenes = {take: actions for take, actions in scenes.items() if actions}
     holder = next(iter(obj for obj in bpy.context.scene.objects if obj.animation_data), None)
-    if holder is None and scenes:  # only shapes or cameras move
+    if holder is None:  # only shapes or cameras move
         holder = bpy.context.scene.objects[0]
         holder.animation_data_create()
     empty = bpy.data.actions.new("Take")
@@ -84,13 +94,14 @@ def _actions(take, owners):
     for owner in owners:
         wanted = f"{owner.name}|{take}"
         for action in bpy.data.actions:
-            if _is_called(action.name, wanted) and (curves.fits(action, owner)):
+            if _is_called(action.name, wanted) and curves.fits(action, owner):
                 found.setdefault(owner, action)
     return found
 
 
 def _is_called(name, wanted):
     cut = wanted.encode()[:_LONGEST].decode("utf-8", "ignore")
+    name = _NUMBER.sub("", name)  # which tells it from that of something else with the same name
     return name == cut or name.startswith(f"{cut}|")  # the name of a layer may follow
 
 
