@@ -226,6 +226,18 @@ def test_gltf_is_a_fixed_point(folder):
     assert np.allclose(times(old), times(new), atol=1e-5)
 
 
+def test_loose_edges_and_points_of_gltf(folder):
+    add_grid(2)
+    for name, edges in (("Wire", [(0, 1), (1, 2)]), ("Cloud", [])):
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata([(0, 0, 1), (1, 0, 1), (2, 0, 1)], edges, [])
+        bpy.context.collection.objects.link(bpy.data.objects.new(name, mesh))
+    source = folder / "in.glb"
+    bpy.ops.export_scene.gltf(filepath=str(source), use_mesh_edges=True, use_mesh_vertices=True)
+    assert compared(source, through(source)) == []
+    assert {len(mesh.vertices) for mesh in bpy.data.meshes if mesh.name in ("Wire", "Cloud")} == {3}
+
+
 def test_clips_of_gltf_with_several_nodes(folder):
     for name in "AB":
         obj = add_grid(2, name)
