@@ -26,12 +26,18 @@ def of(path):
     for kind, find in _KINDS.items():
         if kind in _LACKING.get(suffix, ()):
             names = sorted(set(find(meshes)))
-            if names:
-                is_one = "is" if len(names) == 1 else "are"
-                found.append(Loss(kind, names, f"{path.name} holds no {kind}: {listed(names)} {is_one} not written"))
-    found += [_hidden(path)]
+            found.append(_without(path, kind, names))
+    found.append(_without(path, "hidden objects", _hidden(suffix)))
     found += [_triangles(path, meshes)] if suffix in (".glb", ".gltf") else []
     return [loss for loss in found if loss.names]
+
+
+def _without(path, kind, names):
+    return Loss(kind, names, f"{path.name} holds no {kind}: {listed(names)} {_verb(names)} not written")
+
+
+def _verb(names):
+    return "is" if len(names) == 1 else "are"
 
 
 def _objects():
@@ -51,8 +57,7 @@ def _maps(path, meshes):
     if set(written) & set(lost):
         what = "of each mesh the active one is written, others are not"
     else:
-        verbs = ("is" if len(names) == 1 else "are" for names in (written, lost))
-        what = f"{listed(written)} {next(verbs)} written, {listed(lost)} {next(verbs)} not"
+        what = f"{listed(written)} {_verb(written)} written, {listed(lost)} {_verb(lost)} not"
     return Loss("UV maps", lost, f"{path.name} holds one UV map: {what}")
 
 
@@ -66,11 +71,9 @@ _HIDDEN = {  # what exporters leave out
 }
 
 
-def _hidden(path):
-    is_hidden = _HIDDEN.get(path.suffix.lower(), lambda _: False)
-    names = [obj.name for obj in _objects() if obj.type == 'MESH' and is_hidden(obj)]
-    verb = "is" if len(names) == 1 else "are"
-    return Loss("hidden objects", names, f"{path.name} holds no hidden objects: {listed(names)} {verb} not written")
+def _hidden(suffix):
+    is_hidden = _HIDDEN.get(suffix, lambda _: False)
+    return [obj.name for obj in _objects() if obj.type == 'MESH' and is_hidden(obj)]
 
 
 def _triangles(path, meshes):
