@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -81,9 +82,15 @@ def _beside(mesh, cut):
     return beside
 
 
-def shortened(mesh: Cuttable, cost: np.ndarray, cut: np.ndarray, kept: np.ndarray) -> np.ndarray:
+def shortened(
+    mesh: Cuttable,
+    cost: np.ndarray,
+    cut: np.ndarray,
+    kept: np.ndarray,
+    is_better: Callable[[np.ndarray, np.ndarray], bool] = lambda cut, other: True,
+) -> np.ndarray:
     """A cut (k,) bool that opens the same and costs less: nothing dangles but at `kept` vertices (n,) bool, and each
-    branch is laid anew where there is a cheaper way for it."""
+    branch is laid anew where there is a cheaper way for it, unless `is_better(other_cut, cut)` says no."""
     cut = pruned(mesh, cut, kept)
     for _ in range(_ROUNDS):
         changed = False
@@ -96,7 +103,9 @@ def shortened(mesh: Cuttable, cost: np.ndarray, cut: np.ndarray, kept: np.ndarra
             path = _other_way(mesh, cost, without, branch)
             if path is not None:
                 without[path] = True
-                cut, changed = pruned(mesh, without, kept), True
+                without = pruned(mesh, without, kept)
+                if is_better(without, cut):
+                    cut, changed = without, True
         if not changed:
             break
     return cut
@@ -117,6 +126,6 @@ def _other_way(mesh, cost, cut, branch):
         for end, loop in zip(ends, loops, strict=True)
     )
     limit = (1 - _GAIN) * cost[branch.edges].sum()
-    paths = Paths(opened.vertex_count, opened.ends, cost, mesh.inner & ~cut, its, limit)
+    paths = Paths(opened.vertex_count, opened.ends, cost, np.isfinite(cost) & ~cut, its, limit)
     goal = others[np.argmin(paths.distance[others])]
     return paths.to(goal) if np.isfinite(paths.distance[goal]) else None

@@ -96,3 +96,10 @@ def checked_uv(n: int, uv: ArrayLike) -> np.ndarray:
     if not np.isfinite(uv).all():
         raise UVError("some UVs are no numbers (NaN or infinite): reset them, or start from another map")
     return uv
+
+
+def densities(its: Distortion) -> np.ndarray:
+    """The symmetric Dirichlet energy of every triangle, (m,), whose mean is `symmetric_dirichlet`."""
+    ratio = its.triangle_angle
+    with np.errstate(over="ignore"):
+        return (ratio + 1 / ratio) / 2 * np.cosh(its.triangle_log_area)

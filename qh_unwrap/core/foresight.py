@@ -18,6 +18,7 @@ from .triangles import corner_angles, laid_flat
 
 _LEAST, _LARGEST = 0.05, 20.0  # weights of edges, those of equilateral triangles being 0.58: cotangents can be negative
 _HELD = 1e9  # how stiffly the cuts are held, relative to what acts on a vertex
+_RINGS = 3  # over which values are smoothed
 _FREE = 1e-10  # what keeps the equations solvable where nothing is held
 
 
@@ -89,6 +90,21 @@ class Foresight:
         solution[stiff] = 0
         return solution[self._place]
 
-    def stretch(self, u: np.ndarray) -> float:
-        """The mean square of `u` (n,) over the surface: about twice by how much the energy of a map will exceed 1."""
-        return float((self.area * u * u).sum())
+    def smoothed(self, values: np.ndarray) -> np.ndarray:
+        """Values (n,) at the vertices, averaged over some rings around each."""
+        mesh, n = self._mesh, len(self.area)
+        one, other = mesh.edges.T
+        for _ in range(_RINGS):
+            weight = self.area.copy()
+            total = self.area * values
+            for here, there in ((one, other), (other, one)):
+                weight += np.bincount(here, self.area[there], n)
+                total += np.bincount(here, self.area[there] * values[there], n)
+            values = total / np.maximum(weight, np.finfo(float).tiny)
+        return values
+
+    def at_vertices(self, values: np.ndarray) -> np.ndarray:
+        """Values (m,) of the triangles averaged at the vertices, (n,)."""
+        mesh = self._mesh
+        sums = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3 * values, 3), len(self.area))
+        return sums / np.maximum(self.area, np.finfo(float).tiny)

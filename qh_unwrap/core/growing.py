@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cuts that grow to where a map would stretch most, and shrink where they bring little.
+"""Cuts that grow to where a map stretches most, and shrink where they bring little.
 
-What a cut brings is foreseen (`foresight`), so that many can be tried; a map is made only of what seems good enough.
+What a cut brings is foreseen (`foresight`), so that many can be tried, and a map is made only of what seems good enough.
+What the map then shows corrects what is foreseen.
 """
 
 from __future__ import annotations
@@ -11,15 +12,22 @@ from itertools import count
 
 import numpy as np
 
-from .branches import branches, pruned, shortened
+from .branches import Branch, branches, pruned, shortened
 from .cuttable import Cuttable
 from .foresight import Foresight
+from .mirroring import Mirror
 from .paths import Paths
 
-_CANDIDATES = 4  # places that are tried for every new cut
+_FIRST = 0.6  # of the square of the scaling, by which the energy exceeds 1 by and large
+_RANGE = 0.15, 6.0  # of what the square of the scaling counts somewhere, once a map has been made
+_STRETCHED = 4.0  # the energy of a triangle that counts, at most: a map that failed tells only where
+_CANDIDATES = 4, 3  # places that are tried for every new cut: where it is missing most, and far from the others
 _APART = 0.5  # of how far such a place is from the cut, within which there is no other
+_ALIKE = 0.8  # of what the best cut brings for what it costs, from which on another one is made with it
 _EACH = 0.05  # of the root of the area, that every new cut costs beside its length
 _STEP = 0.25  # of a branch, by which its end is drawn back at once
+_RATE = 0.5  # of what the cut brings for its cost on the average, that a cheaper way may lose
+_WORSE = 1.5  # times what such a step was to cost, from which on the next one is asked first
 
 
 class Growth:
@@ -28,25 +36,43 @@ class Growth:
     Parameters
     ----------
     mesh : Cuttable
-    cost : (k,), of the edges
+    cost : (k,), of the edges, relative to their lengths about 1 or less where they like to be cut
     cut : (k,) bool, that opens it
     kept : (n,) bool, what the cut has to reach for that
+    mirror : Mirror, None where the cut need not be symmetric
 
     Attributes
     ----------
-    stretch : how much a map will stretch, as `Foresight.stretch` says
+    cut : (k,) bool
+    excess : by how much the energy of a map is foreseen to exceed 1
     """
 
-    def __init__(self, mesh: Cuttable, cost: np.ndarray, cut: np.ndarray, kept: np.ndarray):
-        self._mesh, self._cost, self._foresight = mesh, cost, Foresight(mesh)
-        self._each = _EACH * cost[mesh.inner].sum() / mesh.lengths[mesh.inner].sum()
+    def __init__(
+        self, mesh: Cuttable, cost: np.ndarray, cut: np.ndarray, kept: np.ndarray, mirror: Mirror | None = None
+    ):
+        self._mesh, self._cost, self._foresight, self._mirror = mesh, cost, Foresight(mesh), mirror
+        self._usable = np.isfinite(cost)
+        if mirror is not None:
+            cost = np.maximum(cost, cost[mirror.edge])
+            self._usable = np.isfinite(cost) & mirror.first_half[mesh.edges].all(axis=1)
+            self._cost = cost
+        relative = cost[self._usable] / np.maximum(mesh.lengths[self._usable], 1e-12)
+        self._each = _EACH * float(np.median(relative)) if len(relative) else 0.0
+        self._count = np.full(len(mesh.points), _FIRST)
+        self._seen = np.zeros(len(mesh.points))
         self._take(cut, kept)
 
     def _take(self, cut, kept):
         self.cut, self._kept = cut, kept
         self._held = self._foresight.outline(cut)
         self._scaling = self._foresight.scaling(self._held)
-        self.stretch = self._foresight.stretch(self._scaling)
+        self.excess = self._sum(self._scaling)
+
+    def _sum(self, u):
+        return float((self._foresight.area * self._count * u * u).sum())
+
+    def _foreseen(self, cut):
+        return self._sum(self._foresight.scaling(self._foresight.outline(cut)))
 
     @property
     def state(self) -> tuple[np.ndarray, np.ndarray]:
@@ -57,96 +83,148 @@ class Growth:
         """Go back to an earlier state."""
         self._take(*state)
 
-    def _foreseen(self, cut):
-        return self._foresight.stretch(self._foresight.scaling(self._foresight.outline(cut)))
+    def learn(self, energy: np.ndarray) -> None:
+        """Correct what is foreseen by the `energy` (m,) that a map of the present cut has in every triangle."""
+        its = self._foresight
+        seen = its.smoothed(its.at_vertices(np.minimum(np.nan_to_num(energy, nan=np.inf), _STRETCHED) - 1))
+        square = its.smoothed(self._scaling**2)
+        if self._mirror is not None:
+            seen, square = ((each + each[self._mirror.vertex]) / 2 for each in (seen, square))
+        self._seen = seen
+        ratio = (its.area * seen).sum() / max((its.area * square).sum(), 1e-12)
+        low, high = _RANGE[0] * ratio, _RANGE[1] * ratio
+        self._count = np.clip(seen / np.maximum(square, 1e-12), low, high)
+        # The sum is to be that of the map.
+        self._count *= (its.area * seen).sum() / max(self._sum(self._scaling), 1e-12)
+        self.excess = self._sum(self._scaling)
 
     def grow(self) -> bool:
-        """Add the cut that brings most for what it costs; returns whether there is any that brings something."""
-        mesh, best, most = self._mesh, None, 0.0
-        paths = Paths(len(mesh.points), mesh.edges, self._cost, mesh.inner, np.flatnonzero(self._held))
+        """Add the cuts that bring most for what they cost; returns whether there is any that brings something."""
+        mesh = self._mesh
+        plane = None if self._mirror is None else self._mirror.on_plane
+        sources = np.flatnonzero(self._held)
+        paths = Paths(len(mesh.points), mesh.edges, self._cost, self._usable, sources, plane=plane)
+        tried = []
         for tip in self._places(paths):
-            path = paths.to(tip)
-            cut = self.cut.copy()
-            cut[path] = True
-            gain = (self.stretch - self._foreseen(cut)) / (self._cost[path].sum() + self._each)
-            if gain > most:
-                best, most = (cut, tip), gain
-        if best is None:
+            cut, tips = self._joined(paths, [tip])
+            price = self._cost[cut & ~self.cut].sum() + self._each * len(tips)
+            tried.append(((self.excess - self._foreseen(cut)) / price, tip))
+        most = max(tried, default=(0, 0))[0]
+        chosen = [tip for gain, tip in tried if gain >= _ALIKE * most > 0]
+        if not chosen:  # then to where the last map stretched
+            chosen = _largest(np.where(np.isfinite(paths.distance), self._seen * paths.distance, 0))
+        if not chosen:
             return False
+        # What hangs on one tree of paths never meets.
+        cut, tips = self._joined(paths, chosen)
         kept = self._kept.copy()
-        kept[best[1]] = True
-        self._take(best[0], kept)
+        kept[tips] = True
+        self._take(cut, kept)
         return True
+
+    def _joined(self, paths, tips):
+        """The cut with the paths to the tips, and what mirrors them; and the tips with theirs."""
+        cut = self.cut.copy()
+        for tip in tips:
+            cut[paths.to(tip)] = True
+        if self._mirror is not None:
+            tips = [*tips, *self._mirror.vertex[tips].tolist()]
+            cut[self._mirror.edge[cut]] = True
+        return cut, sorted(set(tips))
 
     def _places(self, paths):
         """Vertices where a cut is missing, the most first."""
         points, found = self._mesh.points, []
-        size = np.where(np.isfinite(paths.distance), np.abs(self._scaling), 0)
-        size[self._held] = 0
-        for value in (size, size * np.where(size > 0, paths.distance, 0)):
+        size = np.where(np.isfinite(paths.distance), np.abs(self._scaling) * np.sqrt(self._count), 0)
+        size[self._held] = 0  # which is where no path is needed
+        far = size * np.where(size > 0, paths.distance, 0)
+        for value, number in zip((size, far), _CANDIDATES, strict=True):
             value = value.copy()
-            for _ in range(_CANDIDATES):
+            for _ in range(number):
                 tip = int(np.argmax(value))
                 if not value[tip] > 0:
                     break
                 if tip not in found:
                     found.append(tip)
                 away = np.linalg.norm(points - points[tip], axis=1)
-                value[away <= _APART * away[self._held].min()] = 0
+                value[away <= _APART * away[self._held].min(initial=np.inf)] = 0
         return found
 
     def shorten(self) -> None:
         """Lay the branches anew where there are cheaper ways."""
-        cut = shortened(self._mesh, self._cost, self.cut, self._kept)
+        if self._mirror is not None:
+            return  # which would have to lay both sides alike
+        rate = _RATE * self.excess / max(self._cost[self.cut].sum(), 1e-12)
+        known = {self.cut.tobytes(): self.excess}
+
+        def is_better(cut, other):
+            known[cut.tobytes()] = excess = self._foreseen(cut)
+            saved = self._cost[other].sum() - self._cost[cut].sum()
+            return excess <= known[other.tobytes()] + rate * saved
+
+        cut = shortened(self._mesh, self._cost, self.cut, self._kept, is_better)
         if not np.array_equal(cut, self.cut):
             self._take(cut, self._kept)
 
     def trim(self, most: float) -> None:
-        """Draw back the ends that bring least for what they cost, as long as the stretch is not above `most`."""
-        mesh = self._mesh
+        """Draw back the ends that bring least for what they cost, as long as the excess is not above `most`."""
         tried = count()
-        waiting: list = []
+        waiting: list[tuple[float, int, Branch, int]] = []
 
         def consider(branch):
             """Put the next step back from the end of a branch into the queue."""
             number = max(1, int(np.ceil(_STEP * len(branch.edges))))
-            cut = self.cut.copy()
-            cut[branch.edges[-number:]] = False
-            if not cut.any():
-                return
-            loss = self._foreseen(cut) - self.stretch
-            price = self._cost[branch.edges[-number:]].sum()
-            heapq.heappush(waiting, (loss / price, next(tried), self.stretch, branch, number))
+            cut, _, price = self._drawn_back(branch, number)
+            if cut.any():
+                loss = (self._foreseen(cut) - self.excess) / price
+                heapq.heappush(waiting, (loss, next(tried), branch, number))
 
         for branch in self._ends():
             consider(branch)
         while waiting:
-            _, _, then, branch, number = heapq.heappop(waiting)
+            expected, _, branch, number = heapq.heappop(waiting)
             if not self.cut[branch.edges].all():
                 continue
-            if then != self.stretch:
-                consider(branch)
-                continue
-            cut, kept = self.cut.copy(), self._kept.copy()
-            cut[branch.edges[-number:]] = False
-            kept[branch.vertices[-number:]] = False
-            if number < len(branch.edges):
-                kept[branch.vertices[-number - 1]] = True
-            else:
-                cut = pruned(mesh, cut, kept)
-            before = self.state
+            before, excess = self.state, self.excess
+            cut, kept, price = self._drawn_back(branch, number)
             self._take(cut, kept)
-            if self.stretch > most or not cut.any():
+            loss = (self.excess - excess) / price
+            if self.excess > most or not cut.any():
                 self.restore(before)
+                continue
+            if waiting and loss > max(_WORSE * expected, waiting[0][0]):
+                self.restore(before)
+                heapq.heappush(waiting, (loss, next(tried), branch, number))
+                continue
+            if number < len(branch.edges):
+                consider(Branch(branch.edges[:-number], branch.vertices[:-number]))
             else:
+                fork = branch.vertices[0]
                 for each in self._ends():
-                    if each.vertices[-1] == branch.vertices[-number - 1] or number == len(branch.edges):
+                    if fork in each.vertices:
                         consider(each)
+
+    def _drawn_back(self, branch, number):
+        """The cut and what it keeps without the last `number` edges of a branch, and what mirrors them; what that
+        saves."""
+        cut, kept = self.cut.copy(), self._kept.copy()
+        edges, vertices = branch.edges[-number:], branch.vertices[-number:]
+        if self._mirror is not None:
+            edges = np.append(edges, self._mirror.edge[edges])
+            vertices = np.append(vertices, self._mirror.vertex[vertices])
+        cut[edges], kept[vertices] = False, False
+        if number < len(branch.edges):
+            end = branch.vertices[-number - 1]
+            kept[end] = True
+            if self._mirror is not None:
+                kept[self._mirror.vertex[end]] = True
+        else:
+            cut = pruned(self._mesh, cut, kept)
+        return cut, kept, self._cost[self.cut & ~cut].sum() + (self._each if number == len(branch.edges) else 0)
 
     def _ends(self):
         """The branches that end at a vertex where nothing else is, running to there."""
-        number = self._mesh.degrees(self.cut)
-        loose = (number == 1) & ~self._mesh.on_rim
+        loose = (self._mesh.degrees(self.cut) == 1) & ~self._mesh.on_rim
         found = []
         for branch in branches(self._mesh, self.cut, self._kept):
             first, last = loose[branch.vertices[[0, -1]]]
@@ -155,3 +233,9 @@ class Growth:
             elif first and not last:
                 found.append(branch.reversed)
         return found
+
+
+def _largest(values):
+    """The place of the largest of the values (n,), in a list; none if that is not positive."""
+    place = int(np.argmax(values))
+    return [place] if values[place] > 0 else []

@@ -13,44 +13,54 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from .branches import shortened
+from .branches import pruned, shortened
 from .cuttable import Cuttable
+from .errors import ClosedError
+from .mirroring import Mirror
 from .paths import Paths
 
+_FORBIDDEN = 1e6  # the cost of an edge that may not be cut, relative to the dearest other
 _FREE = 1e-9  # the cost of going along a boundary, relative to the cheapest edge
 
 
-def opening(mesh: Cuttable, cost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def opening(mesh: Cuttable, cost: np.ndarray, mirror: Mirror | None = None) -> tuple[np.ndarray, np.ndarray]:
     """The edges (k,) bool to cut so that an island is a disk, maybe with holes.
 
-    cost  (k,), positive
+    cost    (k,), positive; infinite for edges that may not be cut
+    mirror  None, or what a closed island is to be cut symmetrically to, if it is one without handles
 
-    Returns also the vertices (n,) bool that the cut has to reach: the ends of that of a sphere.
+    Returns also the vertices (n,) bool that the cut has to reach: the ends of that of a sphere.  Raises `ClosedError`
+    where too few edges may be cut.
     """
     cut, kept = np.zeros(len(mesh.edges), bool), np.zeros(len(mesh.points), bool)
     if mesh.topology.excess[0] > 0:
         cut = _handles(mesh, cost)
     elif mesh.topology.is_closed[0]:
-        cut = _slit(mesh, cost)
+        cut = _slit(mesh, cost, None if mirror is None else mirror.on_plane)
         kept = mesh.degrees(cut) == 1
-    return shortened(mesh, cost, cut, kept), kept
+    if np.isinf(cost[cut]).any():
+        raise ClosedError("too few of its edges may be cut to open it: allow more")
+    return cut if mirror is not None else shortened(mesh, cost, cut, kept), kept
 
 
-def far_vertices(mesh: Cuttable) -> tuple[int, int]:
-    """Two vertices that lie far apart: each is the farthest from the other, or nearly."""
-    far = before = 0
+def far_vertices(mesh: Cuttable, usable: np.ndarray) -> tuple[int, int]:
+    """Two vertices that lie far apart along `usable` edges, (k,) bool: each is the farthest from the other, or nearly.
+
+    Both are the same where no edge is usable.
+    """
+    far = before = int(mesh.edges[usable].min(initial=len(mesh.points)) % len(mesh.points))
     for _ in range(3):
-        reach = Paths(len(mesh.points), mesh.edges, mesh.lengths, mesh.mesh_edge >= 0, np.array([far])).distance
+        reach = Paths(len(mesh.points), mesh.edges, mesh.lengths, usable, np.array([far])).distance
         before, far = far, int(np.argmax(np.where(np.isfinite(reach), reach, -1)))
     return before, far
 
 
 def _handles(mesh, cost):
     m, k = len(mesh.triangles), len(mesh.edges)
-    rim = ~mesh.is_whole
-    tiny = _FREE * cost[mesh.inner].min()
-    price = np.where(rim, tiny, cost)
-    root = int(mesh.edges[rim].min()) if rim.any() else far_vertices(mesh)[0]
+    rim, finite = ~mesh.is_whole, np.isfinite(cost)
+    tiny = _FREE * cost[finite].min(initial=1.0)
+    price = np.where(rim, tiny, np.where(finite, cost, _FORBIDDEN * cost[finite].max(initial=1.0)))
+    root = int(mesh.edges[rim].min()) if rim.any() else far_vertices(mesh, mesh.inner)[0]
     paths = Paths(len(mesh.points), mesh.edges, price, rim | mesh.inner, np.array([root]))
     in_tree = np.zeros(k, bool)
     in_tree[paths.tree] = True
@@ -79,16 +89,22 @@ def _handles(mesh, cost):
     left[links[kept[chosen]]] = False
     cut = left.copy()
     cut[paths.union(np.unique(mesh.edges[left]))] = True
-    return cut & mesh.inner
+    return pruned(mesh, cut & mesh.inner, np.zeros(len(mesh.points), bool))
 
 
-def _slit(mesh, cost):
-    """A cheap path between two vertices of a sphere that are far from each other, of two edges at least."""
-    one, other = far_vertices(mesh)
-    path = Paths(len(mesh.points), mesh.edges, cost, mesh.inner, np.array([one])).to(other)
+def _slit(mesh, cost, plane):
+    """A cheap path between two vertices of a sphere that are far from each other, of two edges at least; on the `plane`
+    (n,) bool if there is one."""
+    usable = np.isfinite(cost)
+    if plane is not None:
+        usable &= plane[mesh.edges].all(axis=1)
+    one, other = far_vertices(mesh, usable)
+    path = Paths(len(mesh.points), mesh.edges, cost, usable, np.array([one])).to(other)
     cut = np.zeros(len(mesh.edges), bool)
     cut[path] = True
     if len(path) == 1:  # which would leave an outline of two edges between the same two vertices
-        more = np.flatnonzero(mesh.inner & (mesh.edges == other).any(axis=1) & ~cut)
-        cut[more[np.argmin(cost[more])]] = True
+        more = np.flatnonzero(np.isfinite(cost) & (mesh.edges == other).any(axis=1) & ~cut)
+        cut[more[np.argmin(cost[more])] if len(more) else slice(0)] = True
+    if cut.sum() < 2:
+        raise ClosedError("too few of its edges may be cut to open it: allow more")
     return cut

@@ -19,6 +19,7 @@ class Paths:
     usable : (k,) bool, the edges that paths may use
     sources : vertices, (s,)
     limit : paths that cost more are not looked for
+    plane : (n,) bool, vertices that paths, seen from their sources, reach over other such vertices alone; none if None
 
     Attributes
     ----------
@@ -27,7 +28,14 @@ class Paths:
     """
 
     def __init__(
-        self, n: int, ends: np.ndarray, cost: np.ndarray, usable: np.ndarray, sources: np.ndarray, limit: float = np.inf
+        self,
+        n: int,
+        ends: np.ndarray,
+        cost: np.ndarray,
+        usable: np.ndarray,
+        sources: np.ndarray,
+        limit: float = np.inf,
+        plane: np.ndarray | None = None,
     ):
         self._edges = np.flatnonzero(usable)
         low, high = np.sort(ends[self._edges], axis=1).T
@@ -36,9 +44,14 @@ class Paths:
         self._order = np.argsort(keys, kind="stable")
         self._keys = keys[self._order]
         weight = np.maximum(cost[self._edges], np.finfo(float).tiny)
-        graph = csr_array((weight, (low, high)), shape=(n, n))
+        start, end, directed = low, high, plane is not None
+        if plane is not None:
+            start, end, weight = np.append(low, high), np.append(high, low), np.append(weight, weight)
+            allowed = plane[start] | ~plane[end]
+            start, end, weight = start[allowed], end[allowed], weight[allowed]
+        graph = csr_array((weight, (start, end)), shape=(n, n))
         self.distance, self._before, self.source = dijkstra(
-            graph, directed=False, indices=np.asarray(sources), return_predecessors=True, min_only=True, limit=limit
+            graph, directed=directed, indices=np.asarray(sources), return_predecessors=True, min_only=True, limit=limit
         )
 
     def to(self, vertex: int) -> np.ndarray:
