@@ -104,7 +104,7 @@ def shortened(
             if path is not None:
                 without[path] = True
                 without = pruned(mesh, without, kept)
-                if is_better(without, cut):
+                if without.sum() >= mesh.fewest and is_better(without, cut):
                     cut, changed = without, True
         if not changed:
             break

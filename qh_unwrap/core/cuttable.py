@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .chart import normalised_pieces
-from .errors import ClosedError, GenusError, ShapeError
+from .errors import ClosedError, GenusError, ShapeError, UnwrapError
 from .islands import Island, find_islands
 from .pieces import around_faces, components
 from .topology import HalfEdges, Topology, checked_arrays
@@ -143,6 +143,12 @@ class Cuttable(HalfEdges):
         """(n,) bool, the vertices on the boundary."""
         return self.touched(~self.is_whole)
 
+    @cached_property
+    def fewest(self) -> int:
+        """How many edges a cut must have at least: one alone would leave an outline of two edges between the same two
+        vertices, which is none."""
+        return 2 if self.topology.is_closed[0] else 0
+
     def touched(self, edges: np.ndarray) -> np.ndarray:
         """The vertices, (n,) bool, of the chosen edges, (k,) bool."""
         found = np.zeros(len(self.points), bool)
@@ -254,12 +260,12 @@ class Opened:
         return count, rank[chart]
 
 
-def cuttables(polygons: Polygons, islands: Sequence[Island]) -> list[Cuttable | Exception]:
+def cuttables(polygons: Polygons, islands: Sequence[Island]) -> list[Cuttable | UnwrapError]:
     """The `Cuttable` of every island, or the error that says why there is none."""
-    found: list[Cuttable | Exception] = []
+    found: list[Cuttable | UnwrapError] = []
     for island in islands:
         try:
             found.append(Cuttable(polygons, island))
-        except ValueError as error:
+        except UnwrapError as error:
             found.append(error)
     return found

@@ -16,7 +16,7 @@ from .factors import superlu
 from .ordering import nested_dissection
 from .triangles import corner_angles, laid_flat
 
-_LEAST, _LARGEST = 0.05, 20.0  # weights of edges, those of equilateral triangles being 0.58: cotangents can be negative
+_LEAST, _LARGEST = 0.01, 20.0  # weights of edges, those of equilateral triangles being 0.58: cotangents can be negative
 _HELD = 1e9  # how stiffly the cuts are held, relative to what acts on a vertex
 _RINGS = 3  # over which values are smoothed
 _FREE = 1e-10  # what keeps the equations solvable where nothing is held
@@ -84,8 +84,10 @@ class Foresight:
         nodes = self._nodes
         stiff = np.zeros(nodes, bool)
         stiff[self._place[held]] = True
-        diagonal = self._own * np.where(stiff, _HELD, 1 + _FREE)
-        matrix = self._beside + coo_array((diagonal, (np.arange(nodes), np.arange(nodes))), shape=(nodes, nodes)).tocsc()
+        diagonal = np.where(self._own > 0, self._own, 1) * np.where(stiff, _HELD, 1 + _FREE)
+        matrix = (
+            self._beside + coo_array((diagonal, (np.arange(nodes), np.arange(nodes))), shape=(nodes, nodes)).tocsc()
+        )
         solution = superlu(matrix, single=False).solve(self._curvature[:, None])[:, 0]
         solution[stiff] = 0
         return solution[self._place]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cuts that grow to where a map stretches most, and shrink where they bring little.
 
-What a cut brings is foreseen (`foresight`), so that many can be tried, and a map is made only of what seems good enough.
-What the map then shows corrects what is foreseen.
+What a cut brings is foreseen (`foresight`), so that many can be tried, and a map is made only of what seems good
+enough.  What the map then shows corrects what is foreseen.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ _RANGE = 0.15, 6.0  # of what the square of the scaling counts somewhere, once a
 _STRETCHED = 4.0  # the energy of a triangle that counts, at most: a map that failed tells only where
 _CANDIDATES = 4, 3  # places that are tried for every new cut: where it is missing most, and far from the others
 _APART = 0.5  # of how far such a place is from the cut, within which there is no other
-_ALIKE = 0.8  # of what the best cut brings for what it costs, from which on another one is made with it
 _EACH = 0.05  # of the root of the area, that every new cut costs beside its length
+_SHARP = 0.7  # radians between two faces, from which on a cut along an edge goes on to the end of the line
 _STEP = 0.25  # of a branch, by which its end is drawn back at once
-_RATE = 0.5  # of what the cut brings for its cost on the average, that a cheaper way may lose
+_RATE = 1.0  # of what the cut brings for its cost on the average, that a cheaper way may lose
 _WORSE = 1.5  # times what such a step was to cost, from which on the next one is asked first
 
 
@@ -58,6 +58,8 @@ class Growth:
             self._cost = cost
         relative = cost[self._usable] / np.maximum(mesh.lengths[self._usable], 1e-12)
         self._each = _EACH * float(np.median(relative)) if len(relative) else 0.0
+        self._sharp = mesh.inner & (np.abs(mesh.dihedral) > _SHARP) & np.isfinite(cost)
+        self._amid = mesh.degrees(self._sharp) == 2  # the vertices where a line of sharp edges goes on
         self._count = np.full(len(mesh.points), _FIRST)
         self._seen = np.zeros(len(mesh.points))
         self._take(cut, kept)
@@ -104,33 +106,49 @@ class Growth:
         plane = None if self._mirror is None else self._mirror.on_plane
         sources = np.flatnonzero(self._held)
         paths = Paths(len(mesh.points), mesh.edges, self._cost, self._usable, sources, plane=plane)
-        tried = []
+        most, chosen = 0.0, None
         for tip in self._places(paths):
-            cut, tips = self._joined(paths, [tip])
+            cut, tips = self._joined(paths, tip)
             price = self._cost[cut & ~self.cut].sum() + self._each * len(tips)
-            tried.append(((self.excess - self._foreseen(cut)) / price, tip))
-        most = max(tried, default=(0, 0))[0]
-        chosen = [tip for gain, tip in tried if gain >= _ALIKE * most > 0]
-        if not chosen:  # then to where the last map stretched
-            chosen = _largest(np.where(np.isfinite(paths.distance), self._seen * paths.distance, 0))
-        if not chosen:
-            return False
-        # What hangs on one tree of paths never meets.
-        cut, tips = self._joined(paths, chosen)
+            gain = (self.excess - self._foreseen(cut)) / price
+            if gain > most:
+                most, chosen = gain, (cut, tips)
+        if chosen is None:  # then to where the last map stretched
+            seen = np.where(np.isfinite(paths.distance), self._seen * paths.distance, 0)
+            if not seen.any():
+                return False
+            chosen = self._joined(paths, int(np.argmax(seen)))
         kept = self._kept.copy()
-        kept[tips] = True
-        self._take(cut, kept)
+        kept[chosen[1]] = True
+        self._take(chosen[0], kept)
         return True
 
-    def _joined(self, paths, tips):
-        """The cut with the paths to the tips, and what mirrors them; and the tips with theirs."""
-        cut = self.cut.copy()
-        for tip in tips:
-            cut[paths.to(tip)] = True
+    def _joined(self, paths, tip):
+        """The cut with the path to a tip, and what mirrors it; and the tip with its mirror's, a list."""
+        cut, path = self.cut.copy(), paths.to(tip)
+        cut[path] = True
+        tip = self._at_end_of_line(cut, path, tip)
+        tips = [tip]
         if self._mirror is not None:
-            tips = [*tips, *self._mirror.vertex[tips].tolist()]
             cut[self._mirror.edge[cut]] = True
-        return cut, sorted(set(tips))
+            tips = sorted({tip, int(self._mirror.vertex[tip])})
+        return cut, tips
+
+    def _at_end_of_line(self, cut, path, tip):
+        """Go on from the tip of a path, whose edges begin there, along the line of sharp edges that it follows; returns
+        where that ends."""
+        if not (len(path) and self._sharp[path[0]]):
+            return tip
+        edge, taken = path[0], self._held | self._mesh.touched(path)
+        while self._amid[tip]:
+            beside = self._mesh.triangle_edges[(self._mesh.triangles == tip).any(axis=1)]
+            beside = np.unique(beside[self._sharp[beside] & (self._mesh.edges[beside] == tip).any(axis=2)])
+            edge = beside[beside != edge][0]
+            following = int(self._mesh.edges[edge].sum()) - tip
+            if taken[following] or (self._mirror is not None and not self._usable[edge]):
+                break
+            cut[edge], taken[following], tip = True, True, following
+        return tip
 
     def _places(self, paths):
         """Vertices where a cut is missing, the most first."""
@@ -174,8 +192,12 @@ class Growth:
         def consider(branch):
             """Put the next step back from the end of a branch into the queue."""
             number = max(1, int(np.ceil(_STEP * len(branch.edges))))
+            while number < len(branch.edges) and self._amid[branch.vertices[-number - 1]]:
+                if not self._sharp[branch.edges[-number - 1]]:
+                    break
+                number += 1  # to where the line of sharp edges begins
             cut, _, price = self._drawn_back(branch, number)
-            if cut.any():
+            if cut.sum() >= self._mesh.fewest:
                 loss = (self._foreseen(cut) - self.excess) / price
                 heapq.heappush(waiting, (loss, next(tried), branch, number))
 
@@ -189,7 +211,7 @@ class Growth:
             cut, kept, price = self._drawn_back(branch, number)
             self._take(cut, kept)
             loss = (self.excess - excess) / price
-            if self.excess > most or not cut.any():
+            if self.excess > most or cut.sum() < self._mesh.fewest:
                 self.restore(before)
                 continue
             if waiting and loss > max(_WORSE * expected, waiting[0][0]):
@@ -233,9 +255,3 @@ class Growth:
             elif first and not last:
                 found.append(branch.reversed)
         return found
-
-
-def _largest(values):
-    """The place of the largest of the values (n,), in a list; none if that is not positive."""
-    place = int(np.argmax(values))
-    return [place] if values[place] > 0 else []

@@ -33,12 +33,10 @@ class Mirror:
         size = np.sqrt(mesh.area)
         centre = vertices[mesh.mesh_vertex[0]] - size * mesh.points[0]
         along = mesh.points[:, axis]
-        return cls._across(mesh, axis, -centre[axis] / size) or cls._across(
-            mesh, axis, (along.min() + along.max()) / 2
-        )
+        return cls._across(mesh, axis, -centre[axis] / size) or cls._across(mesh, axis, (along.min() + along.max()) / 2)
 
     @classmethod
-    def _across(cls, mesh, axis, place):
+    def _across(cls, mesh: Cuttable, axis: int, place: float) -> Mirror | None:
         points = mesh.points.copy()
         points[:, axis] -= place
         image = points * np.where(np.arange(3) == axis, -1, 1)

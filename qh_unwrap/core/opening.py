@@ -102,9 +102,9 @@ def _slit(mesh, cost, plane):
     path = Paths(len(mesh.points), mesh.edges, cost, usable, np.array([one])).to(other)
     cut = np.zeros(len(mesh.edges), bool)
     cut[path] = True
-    if len(path) == 1:  # which would leave an outline of two edges between the same two vertices
+    if len(path) == 1:
         more = np.flatnonzero(np.isfinite(cost) & (mesh.edges == other).any(axis=1) & ~cut)
         cut[more[np.argmin(cost[more])] if len(more) else slice(0)] = True
-    if cut.sum() < 2:
+    if cut.sum() < mesh.fewest:
         raise ClosedError("too few of its edges may be cut to open it: allow more")
     return cut

@@ -28,7 +28,7 @@ class SeamSettings:
     """Where seams are to go.  Values are checked when the object is made; raises `SettingsError`."""
 
     distortion: float = setting(
-        1.05,
+        1.025,
         "Distortion",
         "Cut until the mean distortion of the unwrapped model is no larger than this. 1 is none at all; less means"
         " more seams. Smart UV Project ends at about 1.03 on organic models, with five times the seams",

@@ -14,25 +14,13 @@ import numpy as np
 
 from .air import Triangulator
 from .cuttable import Cuttable, Polygons, cuttables
-from .distortion import densities
 from .edge_costs import Wishes, edge_costs
-from .errors import ClosedError, UnwrapError
-from .growing import Growth
-from .mirroring import Mirror
-from .opening import opening
-from .report import Result, Shape
+from .errors import UnwrapError
 from .seam_settings import SeamSettings
+from .searching import ChartSeams, Search
 from .settings import Settings
 from .splitting import splitting
 from .unwrapping import unwrap_islands
-
-_MAPS = 12  # that are made of an island, at most, until its distortion is small enough
-_TRIMS = 5  # that are made at most to see which ends of its cut it does not need
-_CLOSE = 0.94  # of the distortion that is allowed, from which on no end is drawn back any more
-_AIM = 0.97  # of it, that drawing back aims at
-_HARDER = 0.9  # times that is aimed at after each map that was not good enough
-_CUTS = 40  # that are made between two maps, at most
-_ONE_MAP = 0.7  # of an island's work that is left after each map, by and large
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,25 +33,6 @@ class SeamState:
     """(e,) bool, those found so far, and those that stay."""
     energy: float
     """The mean energy of the charts that have a map so far, at one scale; 1 is isometric, NaN if there is none."""
-
-
-@dataclass(frozen=True, eq=False)
-class ChartSeams:
-    """What has become of one of the islands that the mesh consists of before it is cut, or split into."""
-
-    faces: np.ndarray = field(repr=False)
-    """(f',), of the mesh."""
-    energy: float
-    """The mean symmetric Dirichlet energy of its map; NaN if it was not unwrapped."""
-    length: float
-    """Of the seams within it, in the mesh's unit."""
-    certified: bool
-    """It is certified that its map has no flips and no overlaps."""
-    error: UnwrapError | None
-    """Why it cannot be cut or unwrapped."""
-    warnings: tuple[str, ...]
-    result: Result | None = field(repr=False)
-    """Its map, and the report on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +54,9 @@ def cut_open(polygons: Polygons, settings: SeamSettings | None = None, wishes: W
     A piece with handles gets the loops that cut them, a closed one a path between two far vertices.  What cannot be
     opened has its error among the `charts`.  Raises `ShapeError` where the wishes do not fit the mesh.
     """
-    (result,) = (each for each in _search(polygons, settings, wishes, None, None, False) if isinstance(each, SeamResult))
+    (result,) = (
+        each for each in _search(polygons, settings, wishes, None, None, False) if isinstance(each, SeamResult)
+    )
     return result
 
 
@@ -127,9 +98,7 @@ def _search(polygons, settings, wishes, unwrap_settings, triangulate, unwrapping
     if settings.charts > 1:
         polygons = polygons.with_seams(polygons.seam | _splits(polygons, settings, wishes))
     islands = polygons.islands()
-    searches = [
-        _Search(each, polygons, settings, wishes, unwrapping) for each in cuttables(polygons, islands)
-    ]
+    searches = [Search(each, polygons, settings, wishes, unwrapping) for each in cuttables(polygons, islands)]
     seam = polygons.seam | _one_sided(polygons, islands)
 
     def found():
@@ -217,145 +186,3 @@ def _splits(polygons, settings, wishes):
             split = splitting(mesh, edge_costs(mesh, settings, wishes), sharp & mesh.inner, settings.charts)
             found[mesh.mesh_edge[split]] = True
     return found
-
-
-class _Search:
-    """The search for the seams of one island.
-
-    Attributes
-    ----------
-    ended : there is nothing left to do
-    done : the share that is done, from 0 to 1
-    seams : the mesh's edges that are to be cut, as far as is known
-    energy : that of the map of these, NaN if there is none
-    area : of the island, in the mesh's unit
-    """
-
-    def __init__(self, mesh, polygons, settings, wishes, unwrapping):
-        self._mesh, self._goal = mesh, settings.distortion - 1
-        self._error, self._result, self._growth = None, None, None
-        self._warnings = ()
-        self.energy, self.done, self.area = float("nan"), 0.0, 0.0
-        self._maps, self._cuts, self._trims, self._aim = 0, 0, 0, self._goal
-        self._best = self._least = None  # (state, energy, result) of the last good map, and of that of least energy
-        self.ended = True
-        if isinstance(mesh, Exception):
-            self._error = mesh
-            return
-        self.area = mesh.area
-        cost = edge_costs(mesh, settings, wishes)
-        mirror = None
-        if settings.symmetry != "NONE":
-            mirror = self._mirror(polygons, settings)
-        try:
-            cut, kept = self._opening(cost, mirror)
-        except UnwrapError as error:
-            self._error = error
-            return
-        if mirror is not None and not self._is_symmetric(cut, mirror):
-            mirror = None
-            self._warnings += ("it cannot be opened symmetrically: its seams are not",)
-        self._growth, self.ended = Growth(mesh, cost, cut, kept, mirror), not unwrapping
-
-    def _mirror(self, polygons, settings):
-        mirror = Mirror.of(self._mesh, polygons.vertices, "XYZ".index(settings.symmetry))
-        if mirror is None:
-            self._warnings += ("it is not symmetric: nor are its seams",)
-        return mirror
-
-    def _opening(self, cost, mirror):
-        if mirror is not None:
-            try:
-                return opening(self._mesh, np.maximum(cost, cost[mirror.edge]), mirror)
-            except ClosedError:
-                pass
-        return opening(self._mesh, cost)
-
-    @staticmethod
-    def _is_symmetric(cut, mirror):
-        return np.array_equal(cut, cut[mirror.edge])
-
-    @property
-    def seams(self) -> np.ndarray:
-        if self._growth is None:
-            return np.zeros(0, int)
-        return self._mesh.mesh_edge[self._growth.cut]
-
-    @property
-    def shape(self) -> Shape:
-        """What is to be unwrapped."""
-        opened = self._mesh.opened(self._growth.cut)
-        return Shape(self._mesh.points[opened.origin], opened.triangles)
-
-    def grow(self) -> bool:
-        """Go one step towards the next map; returns whether there was any."""
-        growth = self._growth
-        if self._best is not None or self._cuts >= _CUTS or growth.excess <= self._aim:
-            self._cuts = 0
-            return False
-        self._cuts += 1
-        if growth.grow() and growth.excess > self._aim and self._cuts < _CUTS:
-            return True
-        growth.shorten()
-        self._cuts = _CUTS
-        return True
-
-    def take(self, result: Result | UnwrapError) -> None:
-        """Go on after a map, or end."""
-        self._maps += 1
-        self.done = 1 - _ONE_MAP**self._maps
-        growth, failed = self._growth, isinstance(result, UnwrapError)
-        energy = float("inf") if failed else result.report.after.symmetric_dirichlet
-        certified = not failed and result.report.injective
-        if not failed:
-            growth.learn(densities(result.report.after))
-            self.energy = energy
-        found = growth.state, energy, result
-        if self._least is None or (not certified, energy) < (self._is_worse(self._least), self._least[1]):
-            self._least = found
-        if certified and energy - 1 <= self._goal:
-            self._best = found
-            if energy - 1 > _CLOSE * self._goal or not self._drawn_back(_AIM * self._goal):
-                self._end()
-        elif self._best is not None:
-            # Too much was drawn back: half of it may be right.
-            growth.restore(self._best[0])
-            if not self._drawn_back((growth.excess + _AIM * self._goal) / 2):
-                self._end()
-        elif self._maps >= _MAPS:
-            self._end()
-        else:
-            self._aim *= _HARDER
-
-    @staticmethod
-    def _is_worse(found):
-        return isinstance(found[2], UnwrapError) or not found[2].report.injective
-
-    def _drawn_back(self, most):
-        """Whether some ends of the cut can be drawn back for one more map."""
-        self._trims += 1
-        before = self._growth.cut
-        if self._trims <= _TRIMS:
-            self._growth.trim(most)
-        return not np.array_equal(before, self._growth.cut)
-
-    def _end(self):
-        state, self.energy, result = self._best or self._least
-        self._growth.restore(state)
-        self._result = result
-        if isinstance(result, UnwrapError):
-            self._error, self._result, self.energy = result, None, float("nan")
-        elif self._best is None:
-            self._warnings += (
-                f"its distortion stays at {self.energy:.4g}: cuts do not lower it any further"
-                if result.report.injective
-                else "no map without flips and overlaps was found",
-            )
-        self.ended, self.done = True, 1.0
-
-    def chart(self, faces: np.ndarray, polygons: Polygons) -> ChartSeams:
-        result = self._result
-        length = polygons.lengths[self.seams].sum()
-        certified = result is not None and result.report.injective
-        warnings = self._warnings + (result.report.warnings if result is not None else ())
-        return ChartSeams(faces, self.energy, float(length), certified, self._error, warnings, result)

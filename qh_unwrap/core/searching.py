@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The search for the seams of one island: maps are made of its cut, until one is good enough and needs all of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .cuttable import Cuttable, Polygons
+from .distortion import densities
+from .edge_costs import Wishes, edge_costs
+from .errors import ClosedError, UnwrapError
+from .growing import Growth
+from .mirroring import Mirror
+from .opening import opening
+from .report import Result, Shape
+from .seam_settings import SeamSettings
+
+_MAPS = 12  # that are made of an island, at most, until its distortion is small enough
+_TRIMS = 5  # that are made at most to see which ends of its cut it does not need
+_CLOSE = 0.94  # of the distortion that is allowed, from which on no end is drawn back any more
+_AIM = 0.97  # of it, that drawing back aims at
+_HARDER = 0.9  # times that is aimed at after each map that was not good enough
+_CUTS = 40  # that are made between two maps, at most
+_ONE_MAP = 0.7  # of an island's work that is left after each map, by and large
+
+
+@dataclass(frozen=True, eq=False)
+class ChartSeams:
+    """What has become of one of the islands that the mesh consists of before it is cut, or split into."""
+
+    faces: np.ndarray = field(repr=False)
+    """(f',), of the mesh."""
+    energy: float
+    """The mean symmetric Dirichlet energy of its map; NaN if it was not unwrapped."""
+    length: float
+    """Of the seams within it, in the mesh's unit."""
+    certified: bool
+    """It is certified that its map has no flips and no overlaps."""
+    error: UnwrapError | None
+    """Why it cannot be cut or unwrapped."""
+    warnings: tuple[str, ...]
+    result: Result | None = field(repr=False)
+    """Its map, and the report on it."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A cut, and the map of it."""
+
+    state: tuple[np.ndarray, np.ndarray]
+    energy: float
+    certified: bool
+    result: Result | UnwrapError
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """By which the best comes first."""
+        return not self.certified, self.energy
+
+
+class Search:
+    """The search for the seams of one island.
+
+    Attributes
+    ----------
+    ended : there is nothing left to do
+    done : the share that is done, from 0 to 1
+    seams : the mesh's edges that are to be cut, as far as is known
+    energy : that of the map of these, NaN if there is none
+    area : of the island, in the mesh's unit
+    """
+
+    def __init__(
+        self,
+        mesh: Cuttable | UnwrapError,
+        polygons: Polygons,
+        settings: SeamSettings,
+        wishes: Wishes,
+        unwrapping: bool,
+    ):
+        self._goal = settings.distortion - 1
+        self._error: UnwrapError | None = None
+        self._result: Result | None = None
+        self._growth: Growth | None = None
+        self._warnings: tuple[str, ...] = ()
+        self.energy, self.done, self.area = float("nan"), 0.0, 0.0
+        self._maps, self._cuts, self._trims, self._aim = 0, 0, 0, self._goal
+        self._best: _Found | None = None  # the last good map,
+        self._last: _Found | None = None  # the last one,
+        self._least: _Found | None = None  # and the one of least energy
+        self.ended = True
+        if isinstance(mesh, UnwrapError):
+            self._error = mesh
+            return
+        self._mesh = mesh
+        self.area = mesh.area
+        cost = edge_costs(mesh, settings, wishes)
+        mirror = None
+        if settings.symmetry != "NONE":
+            mirror = self._mirror(polygons, settings)
+        try:
+            cut, kept = self._opening(cost, mirror)
+        except UnwrapError as error:
+            self._error = error
+            return
+        if mirror is not None and not np.array_equal(cut, cut[mirror.edge]):
+            mirror = None
+            self._warnings += ("it cannot be opened symmetrically: its seams are not",)
+        self._growth, self.ended = Growth(mesh, cost, cut, kept, mirror), not unwrapping
+
+    def _mirror(self, polygons, settings):
+        mirror = Mirror.of(self._mesh, polygons.vertices, "XYZ".index(settings.symmetry))
+        if mirror is None:
+            self._warnings += ("it is not symmetric: nor are its seams",)
+        return mirror
+
+    def _opening(self, cost, mirror):
+        if mirror is not None:
+            try:
+                return opening(self._mesh, np.maximum(cost, cost[mirror.edge]), mirror)
+            except ClosedError:
+                pass
+        return opening(self._mesh, cost)
+
+    @property
+    def seams(self) -> np.ndarray:
+        if self._growth is None:
+            return np.zeros(0, int)
+        return self._mesh.mesh_edge[self._growth.cut]
+
+    @property
+    def shape(self) -> Shape:
+        """What is to be unwrapped next."""
+        assert self._growth is not None
+        opened = self._mesh.opened(self._growth.cut)
+        return Shape(self._mesh.points[opened.origin], opened.triangles)
+
+    def grow(self) -> bool:
+        """Go one step towards the next map; returns whether there was any."""
+        growth = self._growth
+        assert growth is not None
+        if self._best is None and self._cuts < _CUTS and growth.excess > self._aim:
+            self._cuts += 1
+            if not growth.grow() or growth.excess <= self._aim or self._cuts == _CUTS:
+                growth.shorten()
+                self._cuts = _CUTS
+            return True
+        self._cuts = 0
+        if self._best is None and self._last is not None and np.array_equal(self._last.state[0], growth.cut):
+            self._end()  # there is nothing left to cut
+        return False
+
+    def take(self, result: Result | UnwrapError) -> None:
+        """Go on after a map, or end."""
+        self._maps += 1
+        self.done = 1 - _ONE_MAP**self._maps
+        growth, energy, certified = self._growth, float("inf"), False
+        assert growth is not None
+        if not isinstance(result, UnwrapError):
+            self.energy = energy = result.report.after.symmetric_dirichlet
+            certified = result.report.injective
+            growth.learn(densities(result.report.after))
+        self._last = found = _Found(growth.state, energy, certified, result)
+        if self._least is None or found.rank < self._least.rank:
+            self._least = found
+        if certified and energy - 1 <= self._goal:
+            self._best = found
+            if energy - 1 > _CLOSE * self._goal or not self._drawn_back(_AIM * self._goal):
+                self._end()
+        elif self._best is not None:
+            # Too much was drawn back: half of it may be right.
+            growth.restore(self._best.state)
+            if not self._drawn_back((growth.excess + _AIM * self._goal) / 2):
+                self._end()
+        elif self._maps >= _MAPS:
+            self._end()
+        else:
+            self._aim *= _HARDER
+
+    def _drawn_back(self, most):
+        """Draw back ends of the cut that bring little, for one more map; returns whether there are any."""
+        self._trims += 1
+        before = self._growth.cut
+        if self._trims <= _TRIMS:
+            self._growth.trim(most)
+        return not np.array_equal(before, self._growth.cut)
+
+    def _end(self):
+        found = self._best or self._least
+        self._growth.restore(found.state)
+        if isinstance(found.result, UnwrapError):
+            self._error, self.energy = found.result, float("nan")
+        else:
+            self._result, self.energy = found.result, found.energy
+            if not found.certified:
+                self._warnings += ("no map of it without flips and overlaps was found",)
+            elif self._best is None:
+                self._warnings += (f"its distortion stays at {self.energy:.4g}: more cuts do not help",)
+        self.ended, self.done = True, 1.0
+
+    def chart(self, faces: np.ndarray, polygons: Polygons) -> ChartSeams:
+        """What has become of the island, whose `faces` (f',) these are."""
+        result = self._result
+        length = polygons.lengths[self.seams].sum()
+        certified = result is not None and result.report.injective
+        warnings = self._warnings + (result.report.warnings if result is not None else ())
+        return ChartSeams(faces, self.energy, float(length), certified, self._error, warnings, result)
