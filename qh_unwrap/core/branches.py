@@ -12,7 +12,7 @@ from .cuttable import Cuttable
 from .paths import Paths
 
 _ROUNDS = 2  # how often every branch is laid anew
-_GAIN = 1e-3  # relative to what a branch costs, by which another path must be cheaper to take its place
+_GAIN = 0.01  # relative to what a branch costs, by which another path must be cheaper to take its place
 
 
 class Branch(NamedTuple):

@@ -62,6 +62,7 @@ class Growth:
         self._amid = mesh.degrees(self._sharp) == 2  # the vertices where a line of sharp edges goes on
         self._count = np.full(len(mesh.points), _FIRST)
         self._seen = np.zeros(len(mesh.points))
+        self._gains: dict[tuple[int, float], float] = {}
         self._take(cut, kept)
 
     def _take(self, cut, kept):
@@ -95,6 +96,7 @@ class Growth:
         self._seen = seen
         ratio = (its.area * seen).sum() / max((its.area * square).sum(), 1e-12)
         low, high = _RANGE[0] * ratio, _RANGE[1] * ratio
+        self._gains = {}
         self._count = np.clip(seen / np.maximum(square, 1e-12), low, high)
         # The sum is to be that of the map.
         self._count *= (its.area * seen).sum() / max(self._sum(self._scaling), 1e-12)
@@ -107,10 +109,18 @@ class Growth:
         sources = np.flatnonzero(self._held)
         paths = Paths(len(mesh.points), mesh.edges, self._cost, self._usable, sources, plane=plane)
         most, chosen = 0.0, None
-        for tip in self._places(paths):
+        places = self._places(paths)
+        # What a place brought when it was asked last, it hardly exceeds now, unless it lies nearer to the cut.
+        known = {tip: self._gains.get((tip, round(float(paths.distance[tip]), 9)), np.inf) for tip in places}
+        self._gains = {}
+        for tip in sorted(places, key=lambda tip: -known[tip]):
+            key = tip, round(float(paths.distance[tip]), 9)
+            if known[tip] <= most:
+                self._gains[key] = known[tip]
+                continue
             cut, tips = self._joined(paths, tip)
             price = self._cost[cut & ~self.cut].sum() + self._each * len(tips)
-            gain = (self.excess - self._foreseen(cut)) / price
+            self._gains[key] = gain = (self.excess - self._foreseen(cut)) / price
             if gain > most:
                 most, chosen = gain, (cut, tips)
         if chosen is None:  # then to where the last map stretched

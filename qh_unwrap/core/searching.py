@@ -22,7 +22,8 @@ _TRIMS = 5  # that are made at most to see which ends of its cut it does not nee
 _CLOSE = 0.94  # of the distortion that is allowed, from which on no end is drawn back any more
 _AIM = 0.97  # of it, that drawing back aims at
 _HARDER = 0.9  # times that is aimed at after each map that was not good enough
-_CUTS = 40  # that are made between two maps, at most
+_CUTS = 40  # that are made before the first map, at most,
+_MORE_CUTS = 8  # and between two maps: what a map shows is worth more than what is foreseen
 _ONE_MAP = 0.7  # of an island's work that is left after each map, by and large
 
 
@@ -141,11 +142,12 @@ class Search:
         """Go one step towards the next map; returns whether there was any."""
         growth = self._growth
         assert growth is not None
-        if self._best is None and self._cuts < _CUTS and growth.excess > self._aim:
+        most = _MORE_CUTS if self._maps else _CUTS
+        if self._best is None and self._cuts < most and growth.excess > self._aim:
             self._cuts += 1
-            if not growth.grow() or growth.excess <= self._aim or self._cuts == _CUTS:
+            if not growth.grow() or growth.excess <= self._aim or self._cuts == most:
                 growth.shorten()
-                self._cuts = _CUTS
+                self._cuts = most
             return True
         self._cuts = 0
         if self._best is None and self._last is not None and np.array_equal(self._last.state[0], growth.cut):
