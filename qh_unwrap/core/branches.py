@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .cuttable import Cuttable
-from .paths import Paths
+from .paths import Paths, beside_rims
 
 _ROUNDS = 2  # how often every branch is laid anew
 _GAIN = 0.01  # relative to what a branch costs, by which another path must be cheaper to take its place
@@ -126,6 +126,8 @@ def _other_way(mesh, cost, cut, branch):
         for end, loop in zip(ends, loops, strict=True)
     )
     limit = (1 - _GAIN) * cost[branch.edges].sum()
-    paths = Paths(opened.vertex_count, opened.ends, cost, np.isfinite(cost) & ~cut, its, limit)
+    price = beside_rims(mesh, cost)
+    paths = Paths(opened.vertex_count, opened.ends, price, np.isfinite(price) & ~cut, its, limit)
     goal = others[np.argmin(paths.distance[others])]
-    return paths.to(goal) if np.isfinite(paths.distance[goal]) else None
+    path = paths.to(goal) if np.isfinite(paths.distance[goal]) else None
+    return None if path is None else path[mesh.inner[path]]

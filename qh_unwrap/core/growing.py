@@ -16,7 +16,7 @@ from .branches import Branch, branches, pruned, shortened
 from .cuttable import Cuttable
 from .foresight import Foresight
 from .mirroring import Mirror
-from .paths import Paths
+from .paths import Paths, beside_rims
 
 _FIRST = 0.6  # of the square of the scaling, by which the energy exceeds 1 by and large
 _RANGE = 0.15, 6.0  # of what the square of the scaling counts somewhere, once a map has been made
@@ -51,12 +51,14 @@ class Growth:
         self, mesh: Cuttable, cost: np.ndarray, cut: np.ndarray, kept: np.ndarray, mirror: Mirror | None = None
     ):
         self._mesh, self._cost, self._foresight, self._mirror = mesh, cost, Foresight(mesh), mirror
-        self._usable = np.isfinite(cost)
         if mirror is not None:
-            cost = np.maximum(cost, cost[mirror.edge])
-            self._usable = np.isfinite(cost) & mirror.first_half[mesh.edges].all(axis=1)
-            self._cost = cost
-        relative = cost[self._usable] / np.maximum(mesh.lengths[self._usable], 1e-12)
+            self._cost = cost = np.maximum(cost, cost[mirror.edge])
+        self._price = beside_rims(mesh, cost)
+        self._usable = np.isfinite(self._price)
+        if mirror is not None:
+            self._usable &= mirror.first_half[mesh.edges].all(axis=1)
+        relative = cost[mesh.inner] / np.maximum(mesh.lengths[mesh.inner], 1e-12)
+        relative = relative[np.isfinite(relative)]
         self._each = _EACH * float(np.median(relative)) if len(relative) else 0.0
         self._sharp = mesh.inner & (np.abs(mesh.dihedral) > _SHARP) & np.isfinite(cost)
         self._amid = mesh.degrees(self._sharp) == 2  # the vertices where a line of sharp edges goes on
@@ -107,7 +109,7 @@ class Growth:
         mesh = self._mesh
         plane = None if self._mirror is None else self._mirror.on_plane
         sources = np.flatnonzero(self._held)
-        paths = Paths(len(mesh.points), mesh.edges, self._cost, self._usable, sources, plane=plane)
+        paths = Paths(len(mesh.points), mesh.edges, self._price, self._usable, sources, plane=plane)
         most, chosen = 0.0, None
         places = self._places(paths)
         # What a place brought when it was asked last, it hardly exceeds now, unless it lies nearer to the cut.
@@ -136,7 +138,7 @@ class Growth:
     def _joined(self, paths, tip):
         """The cut with the path to a tip, and what mirrors it; and the tip with its mirror's, a list."""
         cut, path = self.cut.copy(), paths.to(tip)
-        cut[path] = True
+        cut[path] = self._mesh.inner[path]
         tip = self._at_end_of_line(cut, path, tip)
         tips = [tip]
         if self._mirror is not None:
@@ -149,7 +151,7 @@ class Growth:
         where that ends."""
         if not (len(path) and self._sharp[path[0]]):
             return tip
-        edge, taken = path[0], self._held | self._mesh.touched(path)
+        edge, taken = path[0], self._held | self._mesh.touched(path) | self._mesh.on_rim
         while self._amid[tip]:
             beside = self._mesh.triangle_edges[(self._mesh.triangles == tip).any(axis=1)]
             beside = np.unique(beside[self._sharp[beside] & (self._mesh.edges[beside] == tip).any(axis=2)])

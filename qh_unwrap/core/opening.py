@@ -17,10 +17,9 @@ from .branches import pruned, shortened
 from .cuttable import Cuttable
 from .errors import ClosedError
 from .mirroring import Mirror
-from .paths import Paths
+from .paths import Paths, beside_rims
 
 _FORBIDDEN = 1e6  # the cost of an edge that may not be cut, relative to the dearest other
-_FREE = 1e-9  # the cost of going along a boundary, relative to the cheapest edge
 
 
 def opening(mesh: Cuttable, cost: np.ndarray, mirror: Mirror | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -58,8 +57,8 @@ def far_vertices(mesh: Cuttable, usable: np.ndarray) -> tuple[int, int]:
 def _handles(mesh, cost):
     m, k = len(mesh.triangles), len(mesh.edges)
     rim, finite = ~mesh.is_whole, np.isfinite(cost)
-    tiny = _FREE * cost[finite].min(initial=1.0)
-    price = np.where(rim, tiny, np.where(finite, cost, _FORBIDDEN * cost[finite].max(initial=1.0)))
+    price = beside_rims(mesh, np.where(finite, cost, _FORBIDDEN * cost[finite].max(initial=1.0)))
+    tiny = price.min()
     root = int(mesh.edges[rim].min()) if rim.any() else far_vertices(mesh, mesh.inner)[0]
     paths = Paths(len(mesh.points), mesh.edges, price, rim | mesh.inner, np.array([root]))
     in_tree = np.zeros(k, bool)

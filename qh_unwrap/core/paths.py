@@ -7,6 +7,10 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from .cuttable import Cuttable
+
+_FREE = 1e-9  # the cost of going along a boundary, relative to that of the cheapest edge
+
 
 class Paths:
     """The cheapest paths from some vertices to all others.
@@ -81,3 +85,12 @@ class Paths:
     def _between(self, one, other):
         keys = np.minimum(one, other) * np.int64(self._n) + np.maximum(one, other)
         return self._edges[self._order[np.searchsorted(self._keys, keys)]]
+
+
+def beside_rims(mesh: Cuttable, cost: np.ndarray) -> np.ndarray:
+    """The cost (k,) of edges with that of going along a boundary, which is next to nothing.
+
+    So a cheapest path that comes to a hole leaves it once: one that met it twice would cut off what lies between.
+    """
+    finite = cost[np.isfinite(cost)]
+    return np.where(mesh.is_whole, cost, _FREE * finite.min(initial=1.0))

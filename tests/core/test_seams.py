@@ -236,7 +236,7 @@ def test_what_becomes_of_a_piece_does_not_depend_on_the_others():
     assert len(result.charts) == 2
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 481])  # the last one has a hole that a path could meet twice
 def test_random_closed_meshes_unwrap(seed):
     mesh = closed.random_closed(seed)
     result = result_of(mesh)
