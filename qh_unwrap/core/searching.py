@@ -24,6 +24,9 @@ _AIM = 0.97  # of it, that drawing back aims at
 _HARDER = 0.9  # times that is aimed at after each map that was not good enough
 _CUTS = 40  # that are made before the first map, at most,
 _MORE_CUTS = 8  # and between two maps: what a map shows is worth more than what is foreseen
+_PATIENCE = 4  # maps in a row that bring nothing, after which more cuts are of no use
+_NOTHING = 0.05  # of what the energy lies above 1, that a map must bring at least
+_ALMOST = 1.2  # times what the least energy lies above 1: a shorter cut with so much is better, if none is good enough
 _ONE_MAP = 0.7  # of an island's work that is left after each map, by and large
 
 
@@ -51,6 +54,7 @@ class _Found:
     """A cut, and the map of it."""
 
     state: tuple[np.ndarray, np.ndarray]
+    length: float
     energy: float
     certified: bool
     result: Result | UnwrapError
@@ -89,8 +93,7 @@ class Search:
         self.energy, self.done, self.area = float("nan"), 0.0, 0.0
         self._maps, self._cuts, self._trims, self._aim = 0, 0, 0, self._goal
         self._best: _Found | None = None  # the last good map,
-        self._last: _Found | None = None  # the last one,
-        self._least: _Found | None = None  # and the one of least energy
+        self._found: list[_Found] = []  # and all of them
         self.ended = True
         if isinstance(mesh, UnwrapError):
             self._error = mesh
@@ -150,7 +153,7 @@ class Search:
                 self._cuts = most
             return True
         self._cuts = 0
-        if self._best is None and self._last is not None and np.array_equal(self._last.state[0], growth.cut):
+        if self._best is None and self._found and np.array_equal(self._found[-1].state[0], growth.cut):
             self._end()  # there is nothing left to cut
         return False
 
@@ -164,9 +167,9 @@ class Search:
             self.energy = energy = result.report.after.symmetric_dirichlet
             certified = result.report.injective
             growth.learn(densities(result.report.after))
-        self._last = found = _Found(growth.state, energy, certified, result)
-        if self._least is None or found.rank < self._least.rank:
-            self._least = found
+        length = float(self._mesh.lengths[growth.cut].sum())
+        found = _Found(growth.state, length, energy, certified, result)
+        self._found.append(found)
         if certified and energy - 1 <= self._goal:
             self._best = found
             if energy - 1 > _CLOSE * self._goal or not self._drawn_back(_AIM * self._goal):
@@ -176,10 +179,19 @@ class Search:
             growth.restore(self._best.state)
             if not self._drawn_back((growth.excess + _AIM * self._goal) / 2):
                 self._end()
-        elif self._maps >= _MAPS:
+        elif self._maps >= _MAPS or self._is_in_vain:
             self._end()
         else:
             self._aim *= _HARDER
+
+    @property
+    def _is_in_vain(self):
+        """Whether the latest cuts have brought nothing."""
+        early, late = self._found[:-_PATIENCE], self._found[-_PATIENCE:]
+        if not early:
+            return False
+        before, now = (min(each, key=lambda found: found.rank) for each in (early, late))
+        return now.certified == before.certified and now.energy - 1 > (1 - _NOTHING) * (before.energy - 1)
 
     def _drawn_back(self, most):
         """Draw back ends of the cut that bring little, for one more map; returns whether there are any."""
@@ -189,8 +201,16 @@ class Search:
             self._growth.trim(most)
         return not np.array_equal(before, self._growth.cut)
 
+    @property
+    def _almost(self):
+        """What comes near enough to the least energy with a short cut."""
+        least = min(self._found, key=lambda found: found.rank)
+        most = 1 + _ALMOST * (least.energy - 1)
+        near = [found for found in self._found if found.certified == least.certified and found.energy <= most]
+        return min(near, key=lambda found: found.length)
+
     def _end(self):
-        found = self._best or self._least
+        found = self._best or self._almost
         self._growth.restore(found.state)
         if isinstance(found.result, UnwrapError):
             self._error, self.energy = found.result, float("nan")
@@ -199,7 +219,9 @@ class Search:
             if not found.certified:
                 self._warnings += ("no map of it without flips and overlaps was found",)
             elif self._best is None:
-                self._warnings += (f"its distortion stays at {self.energy:.4g}: more cuts do not help",)
+                self._warnings += (
+                    f"its distortion stays at {self.energy:.4g}: more cuts do not help, more charts may",
+                )
         self.ended, self.done = True, 1.0
 
     def chart(self, faces: np.ndarray, polygons: Polygons) -> ChartSeams:
