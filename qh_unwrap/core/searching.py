@@ -21,10 +21,10 @@ _MAPS = 12  # that are made of an island, at most, until its distortion is small
 _TRIMS = 5  # that are made at most to see which ends of its cut it does not need
 _CLOSE = 0.94  # of the distortion that is allowed, from which on no end is drawn back any more
 _AIM = 0.97  # of it, that drawing back aims at
-_HARDER = 0.9  # times that is aimed at after each map that was not good enough
+_HARDER = 0.6, 0.9  # times that is aimed at after each map that was not good enough
 _CUTS = 40  # that are made before the first map, at most,
 _MORE_CUTS = 8  # and between two maps: what a map shows is worth more than what is foreseen
-_PATIENCE = 4  # maps in a row that bring nothing, after which more cuts are of no use
+_PATIENCE = 5  # maps in a row that bring nothing, after which more cuts are of no use
 _NOTHING = 0.05  # of what the energy lies above 1, that a map must bring at least
 _ALMOST = 1.2  # times what the least energy lies above 1: a shorter cut with so much is better, if none is good enough
 _ONE_MAP = 0.7  # of an island's work that is left after each map, by and large
@@ -182,7 +182,7 @@ class Search:
         elif self._maps >= _MAPS or self._is_in_vain:
             self._end()
         else:
-            self._aim *= _HARDER
+            self._aim *= float(np.clip(self._goal / max(energy - 1, 1e-12), *_HARDER))
 
     @property
     def _is_in_vain(self):
