@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from typing import NamedTuple
 
 import numpy as np
@@ -82,19 +82,33 @@ def _beside(mesh, cut):
     return beside
 
 
-def shortened(
+def shortened(mesh: Cuttable, cost: np.ndarray, cut: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """What `shortening` returns where every cheaper way is welcome."""
+    steps = shortening(mesh, cost, cut, kept, lambda cut, other: True)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return stop.value
+
+
+def shortening(
     mesh: Cuttable,
     cost: np.ndarray,
     cut: np.ndarray,
     kept: np.ndarray,
-    is_better: Callable[[np.ndarray, np.ndarray], bool] = lambda cut, other: True,
-) -> np.ndarray:
+    is_better: Callable[[np.ndarray, np.ndarray], bool],
+) -> Generator[None, None, np.ndarray]:
     """A cut (k,) bool that opens the same and costs less: nothing dangles but at `kept` vertices (n,) bool, and each
-    branch is laid anew where there is a cheaper way for it, unless `is_better(other_cut, cut)` says no."""
+    branch is laid anew where there is a cheaper way for it, unless `is_better(other_cut, cut)` says no.
+
+    A generator: yields after each branch, and returns the cut.
+    """
     cut = pruned(mesh, cut, kept)
     for _ in range(_ROUNDS):
         changed = False
         for branch in sorted(branches(mesh, cut, kept), key=lambda branch: -cost[branch.edges].sum()):
+            yield
             # Those laid anew before may have taken its place, or fork from it.
             if not cut[branch.edges].all() or (mesh.degrees(cut)[branch.vertices[1:-1]] != 2).any():
                 continue

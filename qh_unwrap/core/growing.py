@@ -8,11 +8,12 @@ enough.  What the map then shows corrects what is foreseen.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Generator
 from itertools import count
 
 import numpy as np
 
-from .branches import Branch, branches, pruned, shortened
+from .branches import Branch, branches, pruned, shortening
 from .cuttable import Cuttable
 from .foresight import Foresight
 from .mirroring import Mirror
@@ -28,6 +29,8 @@ _SHARP = 0.7  # radians between two faces, from which on a cut along an edge goe
 _STEP = 0.25  # of a branch, by which its end is drawn back at once
 _RATE = 1.0  # of what the cut brings for its cost on the average, that a cheaper way may lose
 _WORSE = 1.5  # times what such a step was to cost, from which on the next one is asked first
+
+Steps = Generator[None, None, None]
 
 
 class Growth:
@@ -180,8 +183,8 @@ class Growth:
                 value[away <= _APART * away[self._held].min(initial=np.inf)] = 0
         return found
 
-    def shorten(self) -> None:
-        """Lay the branches anew where there are cheaper ways."""
+    def shorten(self) -> Steps:
+        """Lay the branches anew where there are cheaper ways; yields after each try."""
         if self._mirror is not None:
             return  # which would have to lay both sides alike
         rate = _RATE * self.excess / max(self._cost[self.cut].sum(), 1e-12)
@@ -192,12 +195,13 @@ class Growth:
             saved = self._cost[other].sum() - self._cost[cut].sum()
             return excess <= known[other.tobytes()] + rate * saved
 
-        cut = shortened(self._mesh, self._cost, self.cut, self._kept, is_better)
+        cut = yield from shortening(self._mesh, self._cost, self.cut, self._kept, is_better)
         if not np.array_equal(cut, self.cut):
             self._take(cut, self._kept)
 
-    def trim(self, most: float) -> None:
-        """Draw back the ends that bring least for what they cost, as long as the excess is not above `most`."""
+    def trim(self, most: float) -> Steps:
+        """Draw back the ends that bring least for what they cost, as long as the excess is not above `most`; yields
+        after each try."""
         tried = count()
         waiting: list[tuple[float, int, Branch, int]] = []
 
@@ -215,7 +219,9 @@ class Growth:
 
         for branch in self._ends():
             consider(branch)
+            yield
         while waiting:
+            yield
             expected, _, branch, number = heapq.heappop(waiting)
             if not self.cut[branch.edges].all():
                 continue

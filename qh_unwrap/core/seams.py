@@ -98,40 +98,60 @@ def _search(polygons, settings, wishes, unwrap_settings, triangulate, unwrapping
     if settings.charts > 1:
         polygons = polygons.with_seams(polygons.seam | _splits(polygons, settings, wishes))
     islands = polygons.islands()
-    searches = [Search(each, polygons, settings, wishes, unwrapping) for each in cuttables(polygons, islands)]
-    seam = polygons.seam | _one_sided(polygons, islands)
+    progress = _Progress(polygons.seam | _one_sided(polygons, islands), islands)
+    searches = progress.searches
+    for mesh in cuttables(polygons, islands):
+        searches.append(Search(mesh, polygons, settings, wishes, unwrapping))
+        yield progress.state(len(searches) - 1)
 
-    def found():
-        seams = seam.copy()
-        for each in searches:
-            seams[each.seams] = True
-        return seams
-
-    sizes = np.array([len(island.triangles) for island in islands], dtype=float)
-    share = sizes / max(sizes.sum(), 1)
-
-    def state():
-        done = float(sum(part * each.done for part, each in zip(share, searches, strict=True)))
-        return SeamState(done, found(), _mean(searches))
-
-    while going := [each for each in searches if not each.ended]:
-        for each in going:
-            while each.grow():
-                yield state()
-        waiting = [each for each in going if not each.ended]
-        steps = unwrap_islands([each.shape for each in waiting], unwrap_settings, triangulate)
+    while going := [k for k, each in enumerate(searches) if not each.ended]:
+        for k in going:
+            for _ in searches[k].grow():
+                yield progress.state(k)
+            progress.note(k)
+        waiting = [k for k in going if not searches[k].ended]
+        steps = unwrap_islands([searches[k].shape for k in waiting], unwrap_settings, triangulate)
         while True:
             try:
                 next(steps)
             except StopIteration as stop:
                 results = stop.value
                 break
-            yield state()
-        for each, result in zip(waiting, results, strict=True):
-            each.take(result)
-        if waiting:
-            yield state()
-    yield _result(polygons, islands, searches, found())
+            yield progress.state()
+        for k, result in zip(waiting, results, strict=True):
+            for _ in searches[k].take(result):
+                yield progress.state(k)
+            yield progress.state(k)
+    yield _result(polygons, islands, searches, progress.seams)
+
+
+class _Progress:
+    """How far the searches of all islands are, brought up to date for one of them at a time."""
+
+    def __init__(self, seams, islands):
+        self.seams, self.searches = seams, []
+        sizes = np.array([len(island.triangles) for island in islands], dtype=float)
+        self._share = sizes / max(sizes.sum(), 1)
+        self._cut = [np.zeros(0, int)] * len(islands)
+        self._done, self._area, self._energy = np.zeros((3, len(islands)))
+
+    def note(self, k):
+        """Take over what the search of island k has come to."""
+        its = self.searches[k]
+        self.seams[self._cut[k]] = False
+        self._cut[k] = its.seams
+        self.seams[self._cut[k]] = True
+        self._done[k] = max(self._done[k], its.done)
+        if its.energy == its.energy:
+            self._area[k], self._energy[k] = its.area, its.energy
+
+    def state(self, k=None):
+        """The `SeamState` now, when nothing has changed but the search of island k."""
+        if k is not None:
+            self.note(k)
+        area = self._area.sum()
+        energy = float((self._area * self._energy).sum() / area) if area > 0 else float("nan")
+        return SeamState(float((self._share * self._done).sum()), self.seams.copy(), energy)
 
 
 def _result(polygons, islands, searches, seams):

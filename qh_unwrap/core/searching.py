@@ -11,7 +11,7 @@ from .cuttable import Cuttable, Polygons
 from .distortion import densities
 from .edge_costs import Wishes, edge_costs
 from .errors import ClosedError, UnwrapError
-from .growing import Growth
+from .growing import Growth, Steps
 from .mirroring import Mirror
 from .opening import opening
 from .report import Result, Shape
@@ -91,7 +91,7 @@ class Search:
         self._growth: Growth | None = None
         self._warnings: tuple[str, ...] = ()
         self.energy, self.done, self.area = float("nan"), 0.0, 0.0
-        self._maps, self._cuts, self._trims, self._aim = 0, 0, 0, self._goal
+        self._maps, self._trims, self._aim = 0, 0, self._goal
         self._best: _Found | None = None  # the last good map,
         self._found: list[_Found] = []  # and all of them
         self.ended = True
@@ -141,24 +141,22 @@ class Search:
         opened = self._mesh.opened(self._growth.cut)
         return Shape(self._mesh.points[opened.origin], opened.triangles)
 
-    def grow(self) -> bool:
-        """Go one step towards the next map; returns whether there was any."""
+    def grow(self) -> Steps:
+        """Go to the next map, or end; yields now and then."""
         growth = self._growth
         assert growth is not None
         most = _MORE_CUTS if self._maps else _CUTS
-        if self._best is None and self._cuts < most and growth.excess > self._aim:
-            self._cuts += 1
-            if not growth.grow() or growth.excess <= self._aim or self._cuts == most:
-                growth.shorten()
-                self._cuts = most
-            return True
-        self._cuts = 0
+        cuts = 0
+        while self._best is None and cuts < most and growth.excess > self._aim and growth.grow():
+            cuts += 1
+            yield
+        if cuts:
+            yield from growth.shorten()
         if self._best is None and self._found and np.array_equal(self._found[-1].state[0], growth.cut):
             self._end()  # there is nothing left to cut
-        return False
 
-    def take(self, result: Result | UnwrapError) -> None:
-        """Go on after a map, or end."""
+    def take(self, result: Result | UnwrapError) -> Steps:
+        """Go on after a map, or end; yields now and then."""
         self._maps += 1
         self.done = 1 - _ONE_MAP**self._maps
         growth, energy, certified = self._growth, float("inf"), False
@@ -172,13 +170,14 @@ class Search:
         self._found.append(found)
         if certified and energy - 1 <= self._goal:
             self._best = found
-            if energy - 1 > _CLOSE * self._goal or not self._drawn_back(_AIM * self._goal):
+            if energy - 1 > _CLOSE * self._goal:
                 self._end()
+            else:
+                yield from self._draw_back(_AIM * self._goal)
         elif self._best is not None:
             # Too much was drawn back: half of it may be right.
             growth.restore(self._best.state)
-            if not self._drawn_back((growth.excess + _AIM * self._goal) / 2):
-                self._end()
+            yield from self._draw_back((growth.excess + _AIM * self._goal) / 2)
         elif self._maps >= _MAPS or self._is_in_vain:
             self._end()
         else:
@@ -193,13 +192,14 @@ class Search:
         before, now = (min(each, key=lambda found: found.rank) for each in (early, late))
         return now.certified == before.certified and now.energy - 1 > (1 - _NOTHING) * (before.energy - 1)
 
-    def _drawn_back(self, most):
-        """Draw back ends of the cut that bring little, for one more map; returns whether there are any."""
+    def _draw_back(self, most):
+        """Draw back ends of the cut that bring little, for one more map; end where there are none."""
+        growth, before = self._growth, self._growth.cut
         self._trims += 1
-        before = self._growth.cut
         if self._trims <= _TRIMS:
-            self._growth.trim(most)
-        return not np.array_equal(before, self._growth.cut)
+            yield from growth.trim(most)
+        if np.array_equal(before, growth.cut):
+            self._end()
 
     @property
     def _almost(self):
