@@ -31,7 +31,7 @@ class SeamSettings:
         1.025,
         "Distortion",
         "Cut until the mean distortion of the unwrapped model is no larger than this. 1 is none at all; less means"
-        " more seams. Smart UV Project ends at about 1.03 on organic models, with five times the seams",
+        " more seams. Smart UV Project ends at about 1.03 on organic models, with several times the seams",
         range=(1.0001, 100.0),
         soft_range=(1.01, 1.5),
     )

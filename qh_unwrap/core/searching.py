@@ -220,7 +220,7 @@ class Search:
                 self._warnings += ("no map of it without flips and overlaps was found",)
             elif self._best is None:
                 self._warnings += (
-                    f"its distortion stays at {self.energy:.4g}: more cuts do not help, more charts may",
+                    f"its distortion stays at {self.energy:.5g}: more cuts do not help, more charts may",
                 )
         self.ended, self.done = True, 1.0
 
