@@ -47,6 +47,8 @@ class Polygons:
         """
         corner_vertex, sizes = np.asarray(corner_vertex, dtype=np.int64), np.asarray(sizes, dtype=np.int64)
         vertices = np.asarray(vertices, dtype=np.float64)
+        if not len(sizes):
+            raise ShapeError("the mesh has no faces: there is nothing to cut")
         if sizes.sum() != len(corner_vertex) or (sizes < 3).any():
             raise ShapeError("the sizes of the faces must be 3 or more, and sum up to the number of corners")
         face_start = np.cumsum(sizes) - sizes

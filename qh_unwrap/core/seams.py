@@ -95,6 +95,9 @@ def _search(polygons, settings, wishes, unwrap_settings, triangulate, unwrapping
     wishes.check(len(polygons.vertices), len(polygons.seam))
     if not settings.keep:
         polygons = polygons.with_seams(np.zeros(len(polygons.seam), bool))
+    if not polygons.selected.any():
+        yield SeamResult(polygons.seam.copy(), [], float("nan"), 0.0)
+        return
     if settings.charts > 1:
         polygons = polygons.with_seams(polygons.seam | _splits(polygons, settings, wishes))
     islands = polygons.islands()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Seams: what is opened is a disk and no more than that, what is cut on is worth it, and wishes count."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -360,6 +361,24 @@ def test_what_no_cut_can_help_is_named():
     flat = Polygons.of_triangles(np.zeros((3, 3)), [[0, 1, 2]])
     (chart,) = result_of(flat).charts
     assert chart.error is not None and not chart.certified
+
+
+def test_where_nothing_is_selected_nothing_is_cut():
+    mesh = closed.box()
+    result = result_of(replace(mesh, selected=np.zeros(len(mesh.selected), bool)))
+    assert not result.seams.any() and not result.charts
+
+
+def test_faces_that_are_not_selected_stay_uncut():
+    mesh = closed.box(2, 2, 2)
+    selected = mesh.vertices[mesh.corner_vertex.reshape(-1, 4), 2].min(axis=1) > 0
+    seams = result_of(replace(mesh, selected=selected)).seams
+    assert (mesh.vertices[mesh.ends[seams], 2] > 0).any(axis=1).all()
+
+
+def test_a_mesh_must_have_faces():
+    with pytest.raises(ShapeError, match="no faces"):
+        Polygons.of_faces(np.zeros((0, 3)), [], [])
 
 
 def test_wishes_must_fit_the_mesh():
