@@ -35,7 +35,6 @@ class SeamSettings:
         range=(1.0001, 100.0),
         soft_range=(1.01, 1.5),
     )
-    keep: bool = setting(True, "Keep Seams", "The seams that are there stay, and new ones are added")
     charts: int = setting(
         1,
         "Charts",

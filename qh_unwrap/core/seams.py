@@ -74,7 +74,7 @@ def cut_to(
 
     Parameters
     ----------
-    polygons : Polygons, its seams stay if `settings.keep`
+    polygons : Polygons, its seams stay
     settings : SeamSettings
     wishes : Wishes, where seams are welcome
     unwrap_settings : Settings, those that the mesh is to be unwrapped with
@@ -93,8 +93,6 @@ def _search(polygons, settings, wishes, unwrap_settings, triangulate, unwrapping
     """Yields states, and the result at last."""
     settings, wishes = settings or SeamSettings(), wishes or Wishes()
     wishes.check(len(polygons.vertices), len(polygons.seam))
-    if not settings.keep:
-        polygons = polygons.with_seams(np.zeros(len(polygons.seam), bool))
     if not polygons.selected.any():
         yield SeamResult(polygons.seam.copy(), [], float("nan"), 0.0)
         return

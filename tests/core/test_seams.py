@@ -132,12 +132,6 @@ def test_seams_that_are_there_count():
     assert np.array_equal(again.seams, once)
 
 
-def test_seams_can_be_forgotten():
-    mesh = ball()
-    everything = np.ones(len(mesh.seam), bool)
-    assert cut_open(mesh.with_seams(everything), SeamSettings(keep=False)).seams.sum() < 20
-
-
 def test_one_sided_pieces_keep_the_edges_where_they_were_cut():
     count = 12
     angle = 2 * np.pi * np.arange(count) / count
