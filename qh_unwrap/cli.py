@@ -5,6 +5,7 @@ Exit codes: 0 everything unwrapped, 1 something failed (the rest is written), 2 
 130 and 143 after SIGINT and SIGTERM.
 """
 
+import argparse
 import dataclasses
 import json
 import os
@@ -16,8 +17,9 @@ from . import console, flags
 from .addon import stopping, streams, writing
 from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
 from .addon.failures import FileError, UsageError
-from .addon.options import MeshOptions
+from .addon.options import MeshOptions, SeamOptions
 from .core import Settings, UnwrapError
+from .core.seam_settings import SeamSettings
 from .core.stepping import finished, mapped
 
 _command = None
@@ -70,9 +72,14 @@ def unwrap_file(path, output=None, **options):
             raise UsageError(f"{name} is {value!r}: choose True or False")
         if name in _REPEATABLE and isinstance(value, str):
             value = [value]
+        elif name == "cut":
+            try:
+                value = flags.cut(value)
+            except argparse.ArgumentTypeError as error:
+                raise UsageError(f"cut: {error}") from None
         elif name in ("json", "preview") and value is not None:
             value = Path(value)
-        elif isinstance(value, str) and isinstance(known[name], str):
+        elif isinstance(value, str) and isinstance(known[name], str) and known[name]:  # a choice, and no free name
             value = value.upper()
         setattr(args, name, value)
     if args.uv_map is not None and args.texcoord is not None:
@@ -142,18 +149,22 @@ def _run(args, record, progress):
     if args.weld is None:
         args.weld = Path(args.input).suffix.lower() in flags.SPLIT
     try:
-        settings, options = (_made_from(args, kind) for kind in (Settings, MeshOptions))
+        vars(args).update(args.cut)
+        kinds = Settings, MeshOptions, SeamSettings, SeamOptions
+        settings, options, seam_settings, seam_options = (_made_from(args, kind) for kind in kinds)
         settings.check_together()
     except UnwrapError as error:
         raise UsageError(error) from None
     values = dataclasses.asdict(settings) | dataclasses.asdict(options)
+    if options.cut != 'NEVER':
+        values |= dataclasses.asdict(seam_settings) | dict(vertex_group=seam_options.vertex_group)
     record.settings = {name: getattr(value, "item", lambda value=value: value)() for name, value in values.items()}
     with stopping.undisturbed(), streams.quiet():
         try:
             import bpy
         except ImportError:
             raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
-        from .addon import choosing, files, preview, selection, unwrapping
+        from .addon import choosing, files, jobs, preview, selection
     record.blender = bpy.app.version_string
 
     _check_formats(args, files, preview)
@@ -181,8 +192,9 @@ def _run(args, record, progress):
             progress(share)
 
     with streams.quiet():
-        steps = unwrapping.unwrap_targets(targets, settings, options, bpy.context)
-        outcomes = finished(mapped(step, steps))
+        steps = jobs.cut_and_unwrap(targets, settings, options, bpy.context, seam_settings, seam_options)
+        outcomes, cuts = finished(mapped(step, steps))
+    record.cuts = [cut.to_dict() for cut in cuts if cut.new.any()]
     record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
     record.begin("write")
     if record.done:
@@ -264,7 +276,8 @@ def _reason(error):
 
 
 def _made_from(args, kind):
-    return kind(**{field.name: getattr(args, field.name) for field in dataclasses.fields(kind)})
+    names = [field.name for field in dataclasses.fields(kind)]
+    return kind(**{name: getattr(args, name) for name in names if hasattr(args, name)})
 
 
 def _check_paths(args):

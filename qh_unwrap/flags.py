@@ -7,8 +7,9 @@ from pathlib import Path
 
 from . import __version__
 from .addon.failures import UsageError
-from .addon.options import MeshOptions
+from .addon.options import MeshOptions, SeamOptions
 from .core import Settings
+from .core.seam_settings import SeamSettings
 
 _DESCRIPTION = "Unwrap meshes with little distortion and without flipped faces."
 _INPUT = (
@@ -44,6 +45,10 @@ _NEEDS = {  # what each flag counts with, where its description does not say so
     "margin": "only where islands are packed",
     "rotate": "only with --placement PACK",
 }
+_CUT = (
+    "never: leave closed islands as they are; needed: open what is closed or has handles along short seams; a number"
+    " like 1.03: go on cutting where it stretches most, until the mean distortion is no larger (default needed)"
+)
 SPLIT = (".glb", ".gltf", ".stl", ".ply")  # what has its vertices split, or each face for itself
 
 
@@ -93,15 +98,36 @@ def parser():
     loudness.add_argument("--quiet", action="store_true", help="show nothing but errors")
     loudness.add_argument("--verbose", action="store_true", help="show every island, however many there are")
     made.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    for title, kind in (("unwrapping", Settings), ("mesh and placement", MeshOptions)):
+    for title, kinds in _GROUPS.items():
         group = made.add_argument_group(title)
-        for field in dataclasses.fields(kind):
+        for field in (field for kind in kinds for field in dataclasses.fields(kind) if field.name not in _IN_CUT):
             action = group.add_argument(f"--{field.name.replace('_', '-')}", **_argument(field))
             action.help = _help(field).replace("%", "%%")
     return made
 
 
+_GROUPS = {
+    "unwrapping": (Settings,),
+    "mesh and placement": (MeshOptions,),
+    "new seams": (SeamSettings, SeamOptions),
+}
+_IN_CUT = ("until", "unwrap", "distortion")  # which --cut says
+
+
+def cut(text):
+    """`--cut` as two settings: how far, and until which distortion."""
+    name = str(text).upper()
+    if name in ("NEVER", "NEEDED"):
+        return dict(cut=name)
+    try:
+        return dict(cut="DISTORTION", distortion=float(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither never, needed nor a distortion like 1.03") from None
+
+
 def _argument(field):
+    if field.name == "cut":
+        return dict(type=cut, metavar="HOW", default=cut("needed"))
     if field.name == "weld":
         return dict(action=argparse.BooleanOptionalAction, default=None)
     if type(field.default) is bool:
@@ -109,11 +135,14 @@ def _argument(field):
     if field.metadata["choices"]:
         names = [choice.identifier for choice in field.metadata["choices"]]
         return dict(type=str.upper, choices=names, metavar="NAME", default=field.default)
-    return dict(type=type(field.default), metavar="NUMBER", default=field.default)
+    metavar = "NAME" if type(field.default) is str else "NUMBER"
+    return dict(type=type(field.default), metavar=metavar, default=field.default)
 
 
 def _help(field):
     meta, default = field.metadata, field.default
+    if field.name == "cut":
+        return _CUT
     notes = [_NEEDS[field.name]] if field.name in _NEEDS else []
     if field.name == "weld":
         notes.append(f"on if not given for {', '.join(SPLIT)}, off for others")
@@ -121,6 +150,8 @@ def _help(field):
         notes.append(f"default {'on' if default else 'off'}")
     elif meta["choices"]:
         notes.append(f"default {default}")
+    elif type(default) is str:
+        notes.append("default none")
     else:
         low, high = meta["range"]
         notes.append(f"{low:g} to {high:g}, default {default:g}")

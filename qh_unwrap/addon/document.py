@@ -32,6 +32,7 @@ class Record:
         self.skipped = {}  # names of objects by the reason
         self.warnings = []  # what Blender says of the files
         self.losses = []  # what the format of the output does not hold: `losses.Loss`
+        self.cuts = []  # the new seams of each mesh, as a dictionary
         self.files = []
         self.is_kept = False  # in a file, for the time being
         self.exit_code = None
@@ -115,6 +116,7 @@ class Record:
             skipped=[dict(reason=reason, objects=names) for reason, names in self.skipped.items()],
             not_written=[loss._asdict() for loss in self.losses],
             warnings=self.warnings,
+            cuts=self.cuts,
             islands=self._islands(),
         )
 

@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from .. import __version__
+from ..core import Settings
 from .options import MeshOptions
 from .outcome import error_findings, findings, latest, summary
 
@@ -19,12 +20,12 @@ class LastRun:
     def __init__(self):
         self.outcomes = latest
         self.ordered, self.errors, self.lines, self.summary, self.settings = [], [], [], "", {}
-        self.options = MeshOptions()
+        self.options, self.unwrap_settings = MeshOptions(), Settings()
 
     def remember(self, outcomes, settings, options):
         self.outcomes[:] = outcomes
         self.settings = dataclasses.asdict(settings) | dataclasses.asdict(options)
-        self.options = options
+        self.options, self.unwrap_settings = options, settings
         self.work_out()
 
     def work_out(self):
@@ -45,6 +46,11 @@ class LastRun:
     def overlapping(self):
         """The outcomes of islands that lie on others since they were unwrapped."""
         return [outcome for outcome in self.outcomes if outcome.overlaps and not outcome.error]
+
+    @property
+    def closed(self):
+        """The outcomes of islands that were left as they were because they are closed or have handles."""
+        return [outcome for outcome in self.outcomes if outcome.needs_cut]
 
     def find(self, obj, number):
         """The outcome of an island, given by its object's name and its number, None if there is none."""

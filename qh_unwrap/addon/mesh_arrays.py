@@ -9,6 +9,9 @@ import bpy
 import numpy as np
 
 from ..core import UnwrapError
+from ..core.cuttable import Polygons
+from ..core.edge_costs import Wishes
+from ..core.pieces import around_faces
 from ..core.welding import find_welds
 from .options import MeshOptions
 from .shown_shape import shown_vertices
@@ -29,6 +32,7 @@ class MeshArrays:
     slot: np.ndarray  # (f,) the number of each face's material among the images
     images: tuple[str, ...]  # what each of the materials shows, the same for what shares its UVs
     welded_edge: np.ndarray | None = None  # (e,) the edge that each counts as, None if nothing shall be welded
+    wishes: Wishes | None = None  # where seams are welcome, if somebody asks
 
     @cached_property
     def one_aspect(self):
@@ -61,6 +65,11 @@ class MeshArrays:
         found = np.logical_and.reduceat(alike, self.face_start)
         return found & (found.sum() > 1)
 
+    def polygons(self, selected):
+        """The mesh as the search for seams wants it, with the `selected` faces (f,) bool."""
+        its = self.corner_vertex, self.corner_edge, self.face_start, self.corner_triangles
+        return Polygons(self.vertices, *its, self.seam, selected)
+
     def image_of(self, faces):
         """The image that most of the faces show."""
         if len(set(self.images)) == 1:
@@ -74,17 +83,20 @@ class MeshArrays:
             yield image, np.array([each == image for each in self.images])[self.slot]
 
 
-def read(obj, options=None):
-    """The object's mesh as arrays, in any mode; does not change it."""
+def read(obj, options=None, vertex_group=None):
+    """The object's mesh as arrays, in any mode; does not change it.
+
+    With the name of a `vertex_group`, which it may lack, also where seams are welcome.
+    """
     options = options or MeshOptions()
     layer = _active_map(obj.data)
     name = layer.name if layer else None
     if obj.mode != 'EDIT':
-        return _read(obj, obj.data, name, options)
+        return _read(obj, obj.data, name, options, vertex_group)
     copy = bpy.data.meshes.new(obj.data.name)
     try:
         bmesh.from_edit_mesh(obj.data).to_mesh(copy)
-        return _read(obj, copy, name, options)
+        return _read(obj, copy, name, options, vertex_group)
     finally:
         bpy.data.meshes.remove(copy)
 
@@ -99,7 +111,7 @@ def is_as_read(obj, arrays):
     return [len(each) for each in now] == [len(arrays.vertices), len(arrays.seam), len(arrays.face_start)]
 
 
-def _read(obj, mesh, uv_name, options):
+def _read(obj, mesh, uv_name, options, vertex_group):
     vertices = shown_vertices(obj, mesh, options.use_subsurf_data)
     shown = np.array(obj.matrix_world.to_3x3()) if options.correct_scale else np.eye(3)
     uv, pinned = None, np.zeros(len(mesh.loops), dtype=bool)
@@ -132,7 +144,31 @@ def _read(obj, mesh, uv_name, options):
         slot=slot,
         images=images,
         welded_edge=welded_edge,
+        wishes=None if vertex_group is None else _wishes(obj, mesh, vertex_group, corner_edge, face_start),
     )
+
+
+def _wishes(obj, mesh, vertex_group, corner_edge, face_start):
+    """Sharp edges and borders of materials are marked, and the vertices of the group are spared by their weights."""
+    marked = _get(mesh.edges, "use_edge_sharp", bool)
+    material = _get(mesh.polygons, "material_index", np.int32)[around_faces(face_start, len(corner_edge))[0]]
+    lowest, highest = np.full(len(marked), np.iinfo(np.int32).max), np.full(len(marked), -1)
+    np.minimum.at(lowest, corner_edge, material)
+    np.maximum.at(highest, corner_edge, material)
+    return Wishes(marked=marked | (lowest < highest), spared=_weights(obj, mesh, vertex_group))
+
+
+def _weights(obj, mesh, name):
+    """The weights (n,) of the vertices in the group, None if there is no such group."""
+    group = obj.vertex_groups.get(name)
+    if group is None:
+        return None
+    weights = np.zeros(len(mesh.vertices))
+    for k, vertex in enumerate(mesh.vertices):
+        for each in vertex.groups:
+            if each.group == group.index:
+                weights[k] = each.weight
+    return weights
 
 
 def _shapes(obj, shown):
@@ -217,6 +253,18 @@ def write(obj, corners, uv):
     else:  # where `layer.uv` would write into arrays that undo steps and copies of the mesh share
         layer.data.foreach_set("uv", values.ravel())
     mesh.update()
+
+
+def edge_vertices(obj):
+    """(e, 2) the vertices of the object's edges; not in Edit Mode."""
+    return _get(obj.data.edges, "vertices", np.int32, 2)
+
+
+def mark_seams(obj, edges):
+    """Mark the edges (e,) bool as seams; call it within `modes.in_object_mode`."""
+    seam = _get(obj.data.edges, "use_seam", bool)
+    obj.data.edges.foreach_set("use_seam", seam | edges)
+    obj.data.update()
 
 
 def _active_map(mesh):

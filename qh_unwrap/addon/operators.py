@@ -1,23 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that unwraps."""
+"""The operators that unwrap and that mark seams."""
+
+import dataclasses
 
 import bpy
 
 from ..core.errors import SettingsError
-from . import properties, selection
-from .outcome import error_sentences, latest, sentences, summary
+from . import jobs, properties, selection, telling
+from .outcome import latest
 from .running import InSteps
-from .unwrapping import unwrap_targets
 
 last_outcomes = latest
 
 
-class QH_OT_unwrap(InSteps, properties.OperatorProperties, bpy.types.Operator):
-    """Unwrap the selected faces, in Object Mode all faces, with little distortion and without flipping any"""
-
-    bl_idname = "uv.qh_unwrap"
-    bl_label = "Quasi-Harmonic Unwrap"
-    bl_options = {'REGISTER', 'UNDO'}
+class _OnSelectedFaces(InSteps):
+    """Mix-in for an operator on the faces that are selected."""
 
     @classmethod
     def poll(cls, context):
@@ -27,6 +24,14 @@ class QH_OT_unwrap(InSteps, properties.OperatorProperties, bpy.types.Operator):
             "Needs a mesh in Edit Mode or selected meshes in Object Mode, not linked from another file"
         )
         return False
+
+
+class QH_OT_unwrap(_OnSelectedFaces, properties.OperatorProperties, bpy.types.Operator):
+    """Unwrap the selected faces, in Object Mode all faces, with little distortion and without flipping any"""
+
+    bl_idname = "uv.qh_unwrap"
+    bl_label = "Quasi-Harmonic Unwrap"
+    bl_options = {'REGISTER', 'UNDO'}
 
     def draw(self, _context):
         properties.draw(self.layout, self)
@@ -47,16 +52,42 @@ class QH_OT_unwrap(InSteps, properties.OperatorProperties, bpy.types.Operator):
         except SettingsError as error:
             self.report({'ERROR'}, str(error))
             return None
-        return unwrap_targets(targets, settings, options, context)
+        return jobs.cut_and_unwrap(targets, settings, options, context)
 
-    def finish(self, outcomes):
-        errors = error_sentences(outcomes)
-        for sentence in (*(errors if len(errors) > 1 else ()), *sentences(outcomes)):
-            self.report({'INFO'}, sentence)
-        failed = sum(bool(outcome.error) for outcome in outcomes)
-        if failed == len(outcomes):
-            self.report({'ERROR'}, summary(outcomes))
-            return {'CANCELLED'}
-        clean = not failed and all(outcome.is_clean for outcome in outcomes)
-        self.report({'INFO'} if clean else {'WARNING'}, summary(outcomes))
-        return {'FINISHED'}
+    def finish(self, result):
+        return telling.tell(self, *result)
+
+
+class QH_OT_seams(_OnSelectedFaces, properties.SeamOperatorProperties, bpy.types.Operator):
+    """Mark seams on the selected faces, in Object Mode on all faces, so that they unwrap with little distortion"""
+
+    bl_idname = "uv.qh_seams"
+    bl_label = "Quasi-Harmonic Seams"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    def draw(self, context):
+        properties.draw_seams(self.layout, self, context.object)
+
+    def invoke(self, context, event):
+        """From a menu: with the panel's settings.  Scripts come to `execute`, with the defaults."""
+        self.take_unset_from(context.scene.qh_seams)
+        return super().invoke(context, event)
+
+    def begin(self, context):
+        targets = selection.targets(context)
+        if not targets:
+            self.report({'ERROR'}, selection.nothing_selected(context))
+            return None
+        group = self.vertex_group
+        if group and all(target.obj.vertex_groups.get(group) is None for target in targets):
+            self.report({'ERROR'}, f"There is no vertex group {group} to spare: choose another one, or none")
+            return None
+        unwrapping = context.scene.qh_unwrap
+        settings, options = unwrapping.settings(), unwrapping.mesh_options()
+        options = dataclasses.replace(options, cut=self.until)
+        work = jobs.cut_and_unwrap if self.unwrap else jobs.cut
+        return work(targets, settings, options, context, self.seam_settings(), self.seam_options())
+
+    def finish(self, result):
+        outcomes, cuts = result
+        return telling.tell(self, outcomes, cuts) if outcomes else telling.tell_of_seams(self, cuts)

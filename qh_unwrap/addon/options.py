@@ -29,6 +29,23 @@ _MARGIN_METHOD = (
 )
 
 
+_NEEDED = Choice(
+    "NEEDED",
+    "Where Needed",
+    "Open what is closed or has handles along short seams in creases and folds; what can be unwrapped stays whole",
+)
+_DISTORTION = Choice(
+    "DISTORTION",
+    "Until Distortion",
+    "Open it, and go on cutting where it stretches most, until its mean distortion is no larger than the one given",
+)
+_CUT = (
+    Choice("NEVER", "Never", "Cut at the seams that are marked, and nowhere else; closed islands are left as they are"),
+    _NEEDED,
+    _DISTORTION,
+)
+
+
 @dataclass(frozen=True)
 class MeshOptions:
     """What counts of a mesh, and where its islands go.  Values are checked; raises `SettingsError`."""
@@ -62,6 +79,28 @@ class MeshOptions:
         " maps; the mesh stays as it is. What a shape key parts is not welded, nor are the two sides of a card",
     )
 
+    cut: str = setting(
+        "NEVER", "Cut", "Whether new seams are marked: those of Quasi-Harmonic Seams, with its settings", choices=_CUT
+    )
+
     def __post_init__(self):
-        for field in dataclasses.fields(self):
-            check(field, getattr(self, field.name))
+        _check(self)
+
+
+@dataclass(frozen=True)
+class SeamOptions:
+    """What counts where seams are marked, beside the core's `SeamSettings`.  Values are checked as well."""
+
+    until: str = setting("DISTORTION", "Cut", "How far to cut", choices=(_NEEDED, _DISTORTION))
+    vertex_group: str = setting(
+        "", "Spare", "The vertex group that seams keep away from; edges between vertices of weight 1 are not cut"
+    )
+    unwrap: bool = setting(True, "Unwrap", "Unwrap the faces as well, with the settings of Quasi-Harmonic Unwrap")
+
+    def __post_init__(self):
+        _check(self)
+
+
+def _check(owner):
+    for field in dataclasses.fields(owner):
+        check(field, getattr(owner, field.name))

@@ -31,6 +31,8 @@ class Outcome:
     overlap_cure: str = ""
     warnings: tuple[str, ...] = ()
     error: str = ""
+    needs_cut: bool = False  # failed because it is closed or has a handle
+    cut_edges: int = 0  # that were marked as seams in it
 
     @property
     def faces(self):
@@ -95,6 +97,7 @@ class Outcome:
             before=self.before and self.before.to_dict(),
             after=self.after.to_dict(),
             iterations=self.iterations,
+            cut_edges=self.cut_edges,
             converged=self.converged,
             injective=self.injective,
             overlaps=list(self.overlaps),

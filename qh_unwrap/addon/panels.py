@@ -15,6 +15,11 @@ def draw_menu(menu, _context):
     menu.layout.operator("uv.qh_unwrap", text="Quasi-Harmonic")
 
 
+def draw_seam_menu(menu, _context):
+    menu.layout.separator()
+    menu.layout.operator("uv.qh_seams")
+
+
 class _Panel:
     bl_label = "QH Unwrap"
     bl_category = "QH Unwrap"
@@ -27,6 +32,20 @@ class _Panel:
         for name, value in settings.as_keywords().items():
             setattr(button, name, value)
         properties.draw(layout.column(), settings)
+
+
+class _SeamPanel:
+    bl_label = "Seams"
+    bl_region_type = 'UI'
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        layout = self.layout
+        settings = context.scene.qh_seams
+        button = layout.operator("uv.qh_seams", text="Mark Seams", icon='MOD_EDGESPLIT')
+        for name, value in settings.as_keywords().items():
+            setattr(button, name, value)
+        properties.draw_seams(layout.column(), settings, context.object)
 
 
 class _ReportPanel:
@@ -46,6 +65,8 @@ class _ReportPanel:
                 _draw_select(row, outcome)
         if last_run.overlapping:
             self.layout.operator("uv.qh_unwrap_pack_overlapping", icon='UV_ISLANDSEL')
+        if last_run.closed:
+            self.layout.operator("uv.qh_unwrap_cut_closed", icon='MOD_EDGESPLIT')
         for outcome in last_run.ordered[:_SHOWN]:
             _draw_outcome(self.layout.column(align=True), outcome)
         if len(last_run.ordered) > _SHOWN:
@@ -92,6 +113,16 @@ class QH_PT_uv_editor(_Panel, bpy.types.Panel):
 
 class QH_PT_view_3d(_Panel, bpy.types.Panel):
     bl_space_type = 'VIEW_3D'
+
+
+class QH_PT_uv_editor_seams(_SeamPanel, bpy.types.Panel):
+    bl_space_type = 'IMAGE_EDITOR'
+    bl_parent_id = "QH_PT_uv_editor"
+
+
+class QH_PT_view_3d_seams(_SeamPanel, bpy.types.Panel):
+    bl_space_type = 'VIEW_3D'
+    bl_parent_id = "QH_PT_view_3d"
 
 
 class QH_PT_uv_editor_report(_ReportPanel, bpy.types.Panel):

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender properties made from the fields of `Settings` and `MeshOptions`, shared by operator, scene and panels."""
+"""Blender properties made from the fields of settings and options, shared by operators, scene and panels."""
 
 import dataclasses
 
 import bpy
 
 from ..core import Settings
-from .options import MeshOptions
+from ..core.seam_settings import SeamSettings
+from .options import MeshOptions, SeamOptions
 
 
 def _property(field, options=frozenset()):
@@ -17,6 +18,8 @@ def _property(field, options=frozenset()):
         return bpy.props.EnumProperty(items=items, **common)
     if type(field.default) is bool:
         return bpy.props.BoolProperty(**common)
+    if type(field.default) is str:
+        return bpy.props.StringProperty(**common)
     (low, high), (soft_low, soft_high) = meta["range"], meta["soft_range"]
     limits = dict(min=low, max=high, soft_min=soft_low, soft_max=soft_high)
     if type(field.default) is int:
@@ -25,23 +28,8 @@ def _property(field, options=frozenset()):
     return bpy.props.FloatProperty(precision=4 if soft_high < 1 else 3, subtype=subtype, **limits, **common)
 
 
-FIELDS = (*dataclasses.fields(Settings), *dataclasses.fields(MeshOptions))
-
-
-class SettingsProperties:
-    """Mix-in with one property per field of `Settings` and `MeshOptions`."""
-
-    __annotations__ = {field.name: _property(field) for field in FIELDS}
-
-    def settings(self):
-        return _made_from(self, Settings)
-
-    def mesh_options(self):
-        return _made_from(self, MeshOptions)
-
-    def as_keywords(self):
-        """All of them by name, as a script would pass them to the operator."""
-        return {field.name: _value(getattr(self, field.name)) for field in FIELDS}
+def _fields(*kinds):
+    return tuple(field for kind in kinds for field in dataclasses.fields(kind))
 
 
 def _made_from(owner, kind):
@@ -53,22 +41,64 @@ def _value(value):
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
-class OperatorProperties(SettingsProperties):
-    """The same for an operator, which forgets them after each run."""
+class _Properties:
+    """Mix-in with one property per field of the `kinds` of dataclasses."""
 
-    __annotations__ = {field.name: _property(field, {'SKIP_SAVE'}) for field in FIELDS}
+    fields = ()
+
+    def __init_subclass__(cls, *, kinds=(), options=frozenset(), **others):
+        super().__init_subclass__(**others)
+        if kinds:
+            cls.fields = _fields(*kinds)
+            cls.__annotations__ = {field.name: _property(field, options) for field in cls.fields}
+
+    def as_keywords(self):
+        """All of them by name, as a script would pass them to the operator."""
+        return {field.name: _value(getattr(self, field.name)) for field in self.fields}
 
     def take_unset_from(self, other):
         """What the caller did not set comes from `other`."""
-        for field in FIELDS:
+        for field in self.fields:
             if not self.properties.is_property_set(field.name):
                 setattr(self, field.name, getattr(other, field.name))
+
+
+class _Unwrapping(_Properties):
+    def settings(self):
+        return _made_from(self, Settings)
+
+    def mesh_options(self):
+        return _made_from(self, MeshOptions)
+
+
+class SettingsProperties(_Unwrapping, kinds=(Settings, MeshOptions)):
+    """How to unwrap."""
+
+
+class OperatorProperties(_Unwrapping, kinds=(Settings, MeshOptions), options={'SKIP_SAVE'}):
+    """The same for an operator, which forgets them after each run."""
+
+
+class _Cutting(_Properties):
+    def seam_settings(self):
+        return _made_from(self, SeamSettings)
+
+    def seam_options(self):
+        return _made_from(self, SeamOptions)
+
+
+class SeamProperties(_Cutting, kinds=(SeamOptions, SeamSettings)):
+    """How to mark seams."""
+
+
+class SeamOperatorProperties(_Cutting, kinds=(SeamOptions, SeamSettings), options={'SKIP_SAVE'}):
+    """The same for an operator, which forgets them after each run."""
 
 
 _FIRST = ('boundary', 'aspect', 'balance', 'iterations', 'weights')
 _SECTIONS = {
     "Layout": ('placement', 'rotate', 'margin_method', 'margin'),
-    "Mesh": ('fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data', 'weld'),
+    "Mesh": ('cut', 'fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data', 'weld'),
     "Advanced": ('initial', 'refine', 'repair', 'tolerance', 'tensor_power'),
 }
 
@@ -112,5 +142,25 @@ def _applies(owner, name):
     }.get(name, True)
 
 
+def draw_seams(layout, owner, obj):
+    """A row for each property of the seams of an object; what does not apply is greyed out."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    for field in owner.fields:
+        name, row = field.name, layout.row()
+        if name == 'vertex_group' and obj is not None and obj.type == 'MESH':
+            row.prop_search(owner, name, obj, "vertex_groups")
+            continue
+        row.active = {
+            'distortion': owner.until == 'DISTORTION',
+            'split_angle': owner.charts > 1,
+        }.get(name, True)
+        row.prop(owner, name)
+
+
 class QHUnwrapSceneSettings(SettingsProperties, bpy.types.PropertyGroup):
     """The settings that the panels show and their button uses."""
+
+
+class QHSeamsSceneSettings(SeamProperties, bpy.types.PropertyGroup):
+    """The same for seams."""

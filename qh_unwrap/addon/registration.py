@@ -8,27 +8,40 @@ from .last_run import last_run
 
 _CLASSES = (
     properties.QHUnwrapSceneSettings,
+    properties.QHSeamsSceneSettings,
     operators.QH_OT_unwrap,
+    operators.QH_OT_seams,
     report_operators.QH_OT_select,
     report_operators.QH_OT_pack_overlapping,
+    report_operators.QH_OT_cut_closed,
     report_operators.QH_OT_copy_report,
     panels.QH_PT_uv_editor,
     panels.QH_PT_view_3d,
+    panels.QH_PT_uv_editor_seams,
+    panels.QH_PT_view_3d_seams,
     panels.QH_PT_uv_editor_report,
     panels.QH_PT_view_3d_report,
 )
+
+_SEAM_MENUS = (bpy.types.IMAGE_MT_uvs, bpy.types.VIEW3D_MT_edit_mesh_edges)
 
 
 def register():
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.qh_unwrap = bpy.props.PointerProperty(type=properties.QHUnwrapSceneSettings)
+    bpy.types.Scene.qh_seams = bpy.props.PointerProperty(type=properties.QHSeamsSceneSettings)
     # The U menu of the 3D View contains this menu too.
     bpy.types.IMAGE_MT_uvs_unwrap.append(panels.draw_menu)
+    for menu in _SEAM_MENUS:
+        menu.append(panels.draw_seam_menu)
 
 
 def unregister():
+    for menu in _SEAM_MENUS:
+        menu.remove(panels.draw_seam_menu)
     bpy.types.IMAGE_MT_uvs_unwrap.remove(panels.draw_menu)
+    del bpy.types.Scene.qh_seams
     del bpy.types.Scene.qh_unwrap
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)

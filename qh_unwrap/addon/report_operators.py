@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The buttons beside the last result: select an island's faces, pack what overlaps, and copy the report."""
+"""The buttons beside the last result: select an island's faces, cut what is closed, pack what overlaps, and copy the
+report."""
 
+import dataclasses
 import itertools
 
 import bmesh
@@ -8,7 +10,9 @@ import bpy
 import numpy as np
 
 from ..core import UnwrapError
+from . import jobs, telling
 from .last_run import last_run
+from .running import InSteps
 from .selection import Target
 from .unwrapping import pack_apart
 
@@ -67,6 +71,21 @@ def _problem(name, obj, outcomes):
     return ""
 
 
+def targets_of(outcomes, context):
+    """The faces of islands of the last result, and why they are not there any more, an empty text if they are."""
+    targets = []
+    for name, group in itertools.groupby(outcomes, key=lambda outcome: outcome.obj):
+        group = list(group)
+        obj = context.view_layer.objects.get(name)
+        problem = _problem(name, obj, group)
+        if problem:
+            return [], problem
+        faces = np.zeros(_face_count(obj), dtype=bool)
+        faces[np.concatenate([outcome.face_indices for outcome in group])] = True
+        targets.append(Target(obj, faces))
+    return targets, ""
+
+
 def _face_count(obj):
     return len(bmesh.from_edit_mesh(obj.data).faces) if obj.mode == 'EDIT' else len(obj.data.polygons)
 
@@ -123,17 +142,11 @@ class QH_OT_pack_overlapping(bpy.types.Operator):
         return False
 
     def execute(self, context):
-        outcomes, targets = last_run.overlapping, []
-        for name, group in itertools.groupby(outcomes, key=lambda outcome: outcome.obj):
-            group = list(group)
-            obj = context.view_layer.objects.get(name)
-            problem = _problem(name, obj, group)
-            if problem:
-                self.report({'ERROR'}, problem)
-                return {'CANCELLED'}
-            faces = np.zeros(_face_count(obj), dtype=bool)
-            faces[np.concatenate([outcome.face_indices for outcome in group])] = True
-            targets.append(Target(obj, faces))
+        outcomes = last_run.overlapping
+        targets, problem = targets_of(outcomes, context)
+        if problem:
+            self.report({'ERROR'}, problem)
+            return {'CANCELLED'}
         try:
             pack_apart(targets, last_run.options, context)
         except UnwrapError as error:
@@ -143,6 +156,37 @@ class QH_OT_pack_overlapping(bpy.types.Operator):
             outcome.overlaps, outcome.more_overlaps = (), 0
         last_run.work_out()
         return {'FINISHED'}
+
+
+class QH_OT_cut_closed(InSteps, bpy.types.Operator):
+    """Mark the seams that closed islands and those with handles need, and unwrap them with the same settings"""
+
+    bl_idname = "uv.qh_unwrap_cut_closed"
+    bl_label = "Cut Open and Unwrap"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    @classmethod
+    def poll(cls, context):
+        if context.mode not in {'OBJECT', 'EDIT_MESH'}:
+            cls.poll_message_set("Needs Object Mode or the Edit Mode of a mesh")
+            return False
+        if last_run.closed:
+            return True
+        cls.poll_message_set("No island of the last result is closed or has a handle")
+        return False
+
+    def begin(self, context):
+        targets, problem = targets_of(last_run.closed, context)
+        if problem:
+            self.report({'ERROR'}, problem)
+            return None
+        options = dataclasses.replace(last_run.options, cut='NEEDED')
+        seams = context.scene.qh_seams
+        settings = last_run.unwrap_settings, options, context, seams.seam_settings(), seams.seam_options()
+        return jobs.cut_and_unwrap(targets, *settings)
+
+    def finish(self, result):
+        return telling.tell(self, *result)
 
 
 class QH_OT_copy_report(_OfLastResult, bpy.types.Operator):

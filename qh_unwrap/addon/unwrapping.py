@@ -10,10 +10,11 @@ import numpy as np
 
 from ..core import Settings, Shape, UnwrapError, placing, unwrap_islands
 from ..core.course import PINS_CROSS
-from ..core.errors import BoundaryError, UVError
+from ..core.errors import BoundaryError, ClosedError, GenusError, UVError
 from ..core.islands import attached, find_islands
 from ..core.stepping import mapped
 from . import judging, layout, mesh_arrays, modes, stacking
+from .hints import hint_at_seams
 from .last_run import last_run
 from .options import MeshOptions
 from .outcome import Outcome, count
@@ -22,16 +23,25 @@ from .work import Work
 
 
 def unwrap_targets(
-    targets: Sequence[Target], settings: Settings, options: MeshOptions, context: bpy.types.Context
+    targets: Sequence[Target],
+    settings: Settings,
+    options: MeshOptions,
+    context: bpy.types.Context,
+    cuts: Sequence = (),
 ) -> Generator[float, None, list[Outcome]]:
     """Unwrap the targets' faces.  A generator: yields the share that is done, returns the outcomes.
 
-    An island that fails is left as it was, and its outcome says why; nothing is written before all are done.
+    An island that fails is left as it was, and its outcome says why; nothing is written before all are done.  With
+    `cuts` (`cutting.Cut`) of some targets, their new seams are marked where the islands beside them get UVs.
     """
-    works = []
+    works, cuts = [], {cut.target.obj: cut for cut in cuts}
     for target in targets:
         yield 0.0
-        works += _works(target, settings, options)
+        cut = cuts.get(target.obj)
+        its = list(_works(target, cut.mesh if cut else mesh_arrays.read(target.obj, options), settings))
+        for work in its if cut else ():
+            work.has_new_seams = bool(cut.new[cut.mesh.corner_edge[work.island.corners]].any())
+        works += its
     yield from mapped(lambda share: _UNWRAPPING * share, _unwrap(works))
     if _are_as_read(works):
         placed = yield from _placed(works, options, context)
@@ -39,7 +49,7 @@ def unwrap_targets(
         if placed and _are_as_read(works):
             with modes.in_object_mode(context):
                 for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
-                    _write(obj, list(group))
+                    _write(obj, list(group), cuts.get(obj))
     outcomes = [work.outcome for work in works]
     last_run.remember(outcomes, settings, options)
     return outcomes
@@ -67,16 +77,15 @@ def _placed(works, options, context):
     yield _UNWRAPPING
     placed = [work for work in works if work.uv is not None]
     judging.judge(placed)
-    yield _UNWRAPPING
+    yield from mapped(lambda _: _UNWRAPPING, hint_at_seams(placed))
     if placed and options.placement != 'UNIT':
         rest = 1 - _UNWRAPPING
         yield from mapped(lambda share: _UNWRAPPING + rest * share, stacking.report_overlaps(placed, works, options))
     return placed
 
 
-def _works(target, settings, options):
+def _works(target, mesh, settings):
     obj, faces, stays_attached = target
-    mesh = mesh_arrays.read(obj, options)
     topology = mesh.corner_vertex, mesh.corner_edge, mesh.face_start, mesh.seam, faces
     hanging = np.zeros(len(mesh.corner_vertex), dtype=bool)
     if stays_attached and mesh.uv is not None:
@@ -105,6 +114,7 @@ def _unwrap(works):
         for (work, _), result in zip(group, results, strict=True):
             if isinstance(result, UnwrapError):
                 work.outcome.error = _explained(result, work)
+                work.outcome.needs_cut = isinstance(result, ClosedError | GenusError)
             else:
                 _keep(work, result)
 
@@ -183,7 +193,7 @@ def _remarks(island):
         yield f"it ends at {count(island.crowded_edges, 'edge')} where more than two faces meet"
 
 
-def _write(obj, works):
+def _write(obj, works, cut):
     corners = np.concatenate([work.island.corners for work in works])
     uv = np.concatenate([work.corner_uv for work in works])
     try:
@@ -192,9 +202,24 @@ def _write(obj, works):
         for work in works:
             work.outcome.error = str(error)
         return
+    if cut is not None:
+        _mark(cut, works)
     areas = placing.areas([(work.vertices, work.triangles) for work in works])
     for work, area in zip(works, areas.tolist(), strict=True):
         work.outcome.area = area
+
+
+def _mark(cut, works):
+    """Mark the new seams beside islands that were unwrapped, and say how many."""
+    beside = np.zeros(len(cut.new), bool)
+    for work in works:
+        its = np.unique(cut.mesh.corner_edge[work.island.corners])
+        work.outcome.cut_edges = int(cut.new[its].sum())
+        beside[its] = True
+    if cut.mesh.welded_edge is not None:
+        beside = beside[cut.mesh.welded_edge]
+    cut.new &= beside
+    mesh_arrays.mark_seams(cut.target.obj, cut.new)
 
 
 def pack_apart(targets: Sequence[Target], options: MeshOptions, context: bpy.types.Context) -> None:
@@ -202,7 +227,7 @@ def pack_apart(targets: Sequence[Target], options: MeshOptions, context: bpy.typ
 
     Raises `UnwrapError` where Blender's packer fails; then nothing is changed.
     """
-    found = [work for target in targets for work in _works(target, Settings(), options)]
+    found = [work for target in targets for work in _works(target, mesh_arrays.read(target.obj, options), Settings())]
     works = [work for work in found if work.old_uv is not None and not work.is_cut]
     if not works:
         return

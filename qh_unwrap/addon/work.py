@@ -29,6 +29,7 @@ class Work:
     mirrored: bool = False
     certified: bool = False  # by the core, before it was placed
     in_frame: bool = False  # of the old UVs, because something of them is held
+    has_new_seams: bool = False  # so that its old place says nothing
 
     @cached_property
     def aspect(self):
@@ -94,7 +95,7 @@ class Work:
     @cached_property
     def old_triangles(self):
         """The triangles' old UVs (t, 3, 2), None if they do not say where the island belongs."""
-        if self.old_uv is None or self.is_fresh:
+        if self.old_uv is None or self.is_fresh or self.has_new_seams:
             return None
         old = self.mesh.uv[self.island.triangle_corners] * self.aspect
         return old if placing.says_where(old) else None
@@ -102,6 +103,13 @@ class Work:
     @cached_property
     def vertices(self):
         return self.mesh.vertices[self.island.vertices]
+
+    @property
+    def polygons(self):
+        """The mesh with this island alone as what is to be unwrapped."""
+        selected = np.zeros(len(self.mesh.face_start), dtype=bool)
+        selected[self.island.faces] = True
+        return self.mesh.polygons(selected)
 
     @property
     def place(self):

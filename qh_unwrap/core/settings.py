@@ -34,7 +34,7 @@ def setting(
     """The dataclass field of one setting, with all that its users need to know of it in `metadata`.
 
     `range` has the least and the largest number, `soft_range` those that a slider shows.  The default has the setting's
-    own type.
+    own type; a text without `choices` is any name.
     """
     metadata = dict(label=label, description=description, range=range, soft_range=soft_range or range, choices=choices)
     return dataclasses.field(default=default, metadata=metadata)
@@ -164,6 +164,9 @@ def check(field: dataclasses.Field, value: Any) -> None:
         names = [choice.identifier for choice in meta["choices"]]
         if value not in names:
             raise SettingsError(f"{field.name} is {value!r}: choose one of {', '.join(names)}")
+    elif kind is str:
+        if not isinstance(value, str):
+            raise SettingsError(f"{field.name} is {value!r}: choose a name")
     elif kind is bool:
         if value not in (True, False):
             raise SettingsError(f"{field.name} is {value!r}: choose True or False")

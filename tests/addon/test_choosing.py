@@ -216,7 +216,7 @@ def test_formats_with_one_map_get_the_new_one(run, suffix):
 def test_a_new_map_is_not_left_where_all_failed(run):
     add_grid(4, "Good")
     bpy.ops.mesh.primitive_cube_add()
-    assert run("--uv-map", "Light")[0] == 1
+    assert run("--uv-map", "Light", "--cut", "never")[0] == 1
     assert bpy.data.objects["Cube"].data.uv_layers.keys() == ["UVMap"]
     assert bpy.data.objects["Good"].data.uv_layers.keys() == ["UVMap", "Light"]
 

@@ -16,6 +16,7 @@ from qh_unwrap.addon import files
 from qh_unwrap.addon.options import MeshOptions
 from qh_unwrap.cli import main
 from qh_unwrap.core import Settings
+from qh_unwrap.core.seam_settings import SeamSettings
 
 _ROOT = Path(__file__).parents[2]
 
@@ -82,7 +83,7 @@ def test_blend_keeps_everything_else(tmp_path):
 
 def test_failure_writes_the_rest_and_exits_with_1(tmp_path, capfd):
     source, target = make_file(tmp_path / "in.blend", cube=True), tmp_path / "out.blend"
-    assert main([str(source), "-o", str(target)]) == 1
+    assert main([str(source), "-o", str(target), "--cut", "never"]) == 1
     printed = capfd.readouterr()
     assert "Box (6 faces) is closed: mark a seam" in printed.err and "Panel 1" in printed.out
     panel = next(obj for obj in files.load(target) if obj.name == "Panel")
@@ -98,7 +99,7 @@ def test_file_without_a_mesh(tmp_path, capfd):
 
 def test_nothing_done_writes_nothing(tmp_path):
     source, target = make_file(tmp_path / "in.blend", cube=True), tmp_path / "out.blend"
-    assert main([str(source), "-o", str(target), "--object", "Box"]) == 3
+    assert main([str(source), "-o", str(target), "--object", "Box", "--cut", "never"]) == 3
     assert not target.exists()
 
 
@@ -164,17 +165,31 @@ def test_failed_writing_leaves_the_old_file(tmp_path, monkeypatch):
 def test_every_setting_is_a_flag(capfd):
     assert main(["--help"]) == 0
     text = capfd.readouterr().out
-    for kind in (Settings, MeshOptions):
-        for field in dataclasses.fields(kind):
+    for field in (field for kind in (Settings, MeshOptions, SeamSettings) for field in dataclasses.fields(kind)):
+        if field.name != "distortion":  # which --cut says
             assert f"--{field.name.replace('_', '-')} " in text
             for choice in field.metadata["choices"]:
-                assert choice.identifier in text
+                assert choice.identifier in text or (field.name == "cut" and choice.identifier.lower() in text)
 
 
 def test_json(tmp_path):
     source, numbers = make_file(tmp_path / "in.blend", cube=True), tmp_path / "numbers.json"
     assert (
-        main([str(source), "--json", str(numbers), "--balance", "0.5", "--no-repair", "--boundary", "rectangle"]) == 1
+        main(
+            [
+                str(source),
+                "--json",
+                str(numbers),
+                "--balance",
+                "0.5",
+                "--no-repair",
+                "--boundary",
+                "rectangle",
+                "--cut",
+                "Never",
+            ]
+        )
+        == 1
     )
     document = json.loads(numbers.read_text())
     expected = dataclasses.asdict(Settings(balance=0.5, repair=False, boundary="RECTANGLE"))
@@ -192,7 +207,7 @@ def test_seams_from_islands(tmp_path):
     bpy.ops.mesh.primitive_cube_add()
     source = tmp_path / "cube.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(source), copy=True)
-    assert main([str(source)]) == 3, "closed"
+    assert main([str(source), "--cut", "never"]) == 3, "closed"
     target = tmp_path / "out.blend"
     assert main([str(source), "--seams-from-islands", "-o", str(target)]) == 0
     (obj,) = files.load(target)

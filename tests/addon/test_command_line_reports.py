@@ -18,7 +18,7 @@ from scenes import add_cube, add_grid, mesh_object
 
 import qh_unwrap
 from qh_unwrap import cli, console
-from qh_unwrap.addon import document, files, unwrapping
+from qh_unwrap.addon import document, files, jobs
 from qh_unwrap.addon.outcome import listed
 from qh_unwrap.cli import main
 
@@ -100,7 +100,7 @@ def test_report_of_a_good_run(source, tmp_path):
 
 
 def test_report_of_a_run_that_goes_well_in_part(mixed, tmp_path):
-    report = run(mixed, "-o", tmp_path / "out.obj", report=tmp_path / "r.json")
+    report = run(mixed, "-o", tmp_path / "out.obj", "--cut", "never", report=tmp_path / "r.json")
     assert report["status"] == "partial" and report["exit_code"] == 1
     assert report["totals"]["failed"] == 1 and report["totals"]["objects"] == 2
     by_name = {island["object"]: island for island in report["islands"]}
@@ -122,7 +122,7 @@ def test_report_of_a_run_that_goes_well_in_part(mixed, tmp_path):
 def test_no_old_success_is_left(mixed, tmp_path, arguments, code, status):
     report = tmp_path / "r.json"
     run(mixed, "--object", "Panel", report=report)
-    found = run(mixed, *arguments, "--overwrite", report=report)
+    found = run(mixed, *arguments, "--overwrite", "--cut", "never", report=report)
     assert (found["exit_code"], found["status"]) == (code, status) and found["error"]
 
 
@@ -132,7 +132,7 @@ def test_unreadable_input_and_a_fault_of_ours(source, tmp_path, monkeypatch, cap
     found = run(broken, report=tmp_path / "r.json")
     assert found["exit_code"] == 3 and f"cannot read {broken}" in found["error"]
     assert capfd.readouterr().err.count("\n") == 1
-    monkeypatch.setattr(unwrapping, "unwrap_targets", lambda *_: 1 / 0)
+    monkeypatch.setattr(jobs, "unwrap_targets", lambda *_: 1 / 0)
     found = run(source, report=tmp_path / "s.json")
     assert found["exit_code"] == 3 and "ZeroDivisionError" in found["error"]
 
@@ -222,7 +222,7 @@ def test_a_row_for_each_object_where_there_are_many(tmp_path, capfd):
 
 def test_quiet(mixed, capfd):
     capfd.readouterr()
-    assert main([str(mixed), "--quiet"]) == 1
+    assert main([str(mixed), "--quiet", "--cut", "never"]) == 1
     printed = capfd.readouterr()
     assert not printed.out and "Box (6 faces) is closed" in printed.err
 
@@ -263,7 +263,7 @@ def test_from_python(mixed, tmp_path):
     report = qh_unwrap.unwrap_file(mixed, target, boundary="circle", balance=np.float32(0.5), object="P*")
     checked(json.dumps(report))
     assert report["status"] == "ok" and report["settings"]["boundary"] == "CIRCLE" and target.exists()
-    assert qh_unwrap.unwrap_file(str(mixed))["exit_code"] == 1, "failed islands raise nothing"
+    assert qh_unwrap.unwrap_file(str(mixed), cut="never")["exit_code"] == 1, "failed islands raise nothing"
     (tmp_path / "broken.ply").write_text("no mesh")
     assert qh_unwrap.unwrap_file(tmp_path / "broken.ply")["exit_code"] == 3
     assert len(qh_unwrap.last_report()) == 2

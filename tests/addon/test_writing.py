@@ -17,7 +17,7 @@ import io_scene_gltf2
 import pytest
 from scenes import add_grid
 
-from qh_unwrap.addon import checking, files, preview, unwrapping, writing
+from qh_unwrap.addon import checking, files, jobs, preview, writing
 from qh_unwrap.addon.failures import FileError
 from qh_unwrap.cli import main
 
@@ -200,7 +200,7 @@ def test_symbolic_link_to_another_disk(source, folder):
 def test_room_is_looked_at_before_the_work(source, folder, capfd, monkeypatch):
     usage = type("Usage", (), {"free": 1000})
     monkeypatch.setattr(writing.shutil, "disk_usage", lambda folder: usage)
-    monkeypatch.setattr(unwrapping, "unwrap_targets", lambda *_: pytest.fail("the work has begun"))
+    monkeypatch.setattr(jobs, "unwrap_targets", lambda *_: pytest.fail("the work has begun"))
     assert main([str(source), "-o", str(folder / "out.obj")]) == 3
     assert "are needed, and 0.0 MB are free" in capfd.readouterr().err
 
@@ -241,7 +241,7 @@ def test_signals_leave_nothing(source, folder, capfd, monkeypatch, when, number,
     target.write_text("old")
     place, name = {
         "read": (files, "load"),
-        "unwrap": (unwrapping, "unwrap_targets"),
+        "unwrap": (jobs, "unwrap_targets"),
         "write": (io_scene_gltf2.ExportGLTF2, "execute"),  # where Blender makes another exception of what comes
         "put in place": (writing.os, "replace"),
     }[when]

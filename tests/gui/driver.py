@@ -22,6 +22,7 @@ def steps(gui):
     yield from _sidebars(gui)
     yield from _reports(gui)
     yield from _troubles(gui)
+    yield from _seams(gui)
     yield from _long_work(gui)
 
 
@@ -138,6 +139,29 @@ def _troubles(gui):
         bpy.ops.view3d.view_selected()
     yield 2
     gui.shot("18_island_selected.png")
+
+
+def _seams(gui):
+    """Seams are marked, and the islands that they make are laid out anew."""
+    gui.area('IMAGE_EDITOR').ui_type = 'UV'
+    _add(gui, bpy.ops.mesh.primitive_monkey_add, lambda one, other: False)
+    gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Unwrap"]))
+    yield 2
+    gui.shot("19_without_seams.png")
+    gui.move('VIEW_3D', fx=0.2, fy=0.5)
+    yield 1
+    gui.key("ctrl+e")
+    yield 1
+    gui.shot("20_edge_menu.png")
+    gui.key("Escape")
+    yield 1
+    with gui.override('VIEW_3D'):
+        bpy.ops.uv.qh_seams('INVOKE_DEFAULT')
+    yield 6
+    with gui.override('IMAGE_EDITOR'):
+        bpy.ops.image.view_all(fit_view=True)
+    yield 1
+    gui.shot("21_seams.png")
 
 
 def _troubled(calc_uvs):
