@@ -2,7 +2,6 @@
 """The standard streams, into which Blender prints as well; needs no Blender."""
 
 import ctypes
-import gc
 import os
 import re
 import tempfile
@@ -43,11 +42,7 @@ def quiet(told=None):
             redirect_stdout(_stream_2()),
             redirect_stderr(_stream_2()),
         ):
-            try:
-                yield
-            except BaseException:
-                gc.collect()  # else a file that could not be closed complains when the output is seen again
-                raise
+            yield
         stopping.check()  # what Blender may have printed as an error of a handler
         for file in said:
             file.seek(0)
