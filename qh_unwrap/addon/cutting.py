@@ -50,14 +50,30 @@ def find(target, until, seam_settings, seam_options, options, settings):
     yield 0.0
     polygons = mesh.polygons(target.faces)
     if until == 'NEEDED':
-        result = cut_open(polygons, seam_settings, mesh.wishes)
-    else:
-        steps = cut_to(polygons, seam_settings, mesh.wishes, _free(settings))
-        result = yield from mapped(lambda state: state.done, steps)
+        # What has to be cut is cut until it has a map, however much that stretches; the rest is not looked at again.
+        opened = cut_open(polygons, seam_settings, mesh.wishes)
+        target = target._replace(faces=_to_cut(opened, mesh))
+        polygons = mesh.polygons(target.faces)
+        seam_settings = dataclasses.replace(seam_settings, distortion=_ANY)
+    steps = cut_to(polygons, seam_settings, mesh.wishes, _free(settings))
+    result = yield from mapped(lambda state: state.done, steps)
     seams = result.seams | mesh.seam
     if mesh.welded_edge is not None:
         seams = (np.bincount(mesh.welded_edge, seams, len(seams)) > 0)[mesh.welded_edge]
     return Cut(target, dataclasses.replace(mesh, seam=seams), seams & ~mesh.seam, result)
+
+
+_ANY = 100.0  # distortion, more than that of any map that is worth having
+
+
+def _to_cut(opened, mesh):
+    """The faces (f,) bool of the pieces that got new seams, or could not be opened."""
+    new = (opened.seams & ~mesh.seam)[mesh.corner_edge]
+    touched = np.bincount(mesh.corner_faces, new, len(mesh.face_start)) > 0
+    faces = np.zeros(len(touched), dtype=bool)
+    for chart in opened.charts:
+        faces[chart.faces] = chart.error is not None or touched[chart.faces].any()
+    return faces
 
 
 def _free(settings):

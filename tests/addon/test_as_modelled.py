@@ -330,7 +330,7 @@ def test_a_map_that_covers_nothing_twice_is_not_given_up_for_one_that_does():
     assert report["injective"]
     before = uvs(obj)
     obj, (report,) = unwrapped(points, faces, before, **rough)
-    assert report["injective"] and "stay as they were" in report["warnings"][-1]
+    assert report["injective"] and any("stay as they were" in text for text in report["warnings"])
     np.testing.assert_allclose(uvs(obj), before, atol=1e-6)
     obj, _ = unwrapped(points, faces, before, **rough, repair=False)
     assert not np.allclose(uvs(obj), before, atol=0.1), "which is wanted as it comes"
