@@ -11,6 +11,7 @@ BENCHMARKS = (
     "reference_table",
     "convergence",
     "figure_7_self_correction",
+    "figure_9_closed_model",
     "figures_2_8_comparison",
     "figure_10_mean_value",
     "figure_11_distortion",
