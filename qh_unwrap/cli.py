@@ -21,6 +21,7 @@ from .addon.options import MeshOptions, SeamOptions
 from .core import Settings, UnwrapError
 from .core.seam_settings import SeamSettings
 from .core.stepping import finished, mapped
+from .patching.original import PatchError
 
 _command = None
 
@@ -164,10 +165,11 @@ def _run(args, record, progress):
             import bpy
         except ImportError:
             raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
-        from .addon import choosing, files, jobs, preview, selection
+        from .addon import choosing, files, jobs, patches, preview, selection
     record.blender = bpy.app.version_string
 
     _check_formats(args, files, preview)
+    record.write = patches.mode(args.write, args.input, args.output)
     _keep(args, record)  # which says that the run is not finished, in place of what an earlier one said
     record.begin("read")
     with _at_file("read", args.input, record):
@@ -185,6 +187,7 @@ def _run(args, record, progress):
     targets = choice.narrowed(targets, args.material)
     objects = choice.required()
     maps.make_missing(objects)
+    patch = patches.Patch(args.input, objects, maps) if record.write == patches.PATCH else None
 
     def step(share):
         stopping.check()
@@ -198,11 +201,11 @@ def _run(args, record, progress):
     record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
     record.begin("write")
     if record.done:
-        _write(args, record, maps, targets, options)
+        _write(args, record, maps, targets, options, patch)
     record.judge()
 
 
-def _write(args, record, maps, targets, options):
+def _write(args, record, maps, targets, options, patch):
     from .addon import checking, files, losses, preview
 
     named = {outcome.obj for outcome in record.done}
@@ -216,16 +219,30 @@ def _write(args, record, maps, targets, options):
             with _at_file("write", args.preview, record):
                 staging.write(args.preview, draw, checking.check_image)
         if args.output:
+            with _at_file("write", args.output, record):
+                is_patched = patch and _patch(args, record, patch, staging)
             if args.output.suffix.lower() not in losses.ONE_MAP:  # of which the active one is that with the new UVs
                 maps.restore(done)
-            record.losses = losses.of(args.output)
-            with _at_file("write", args.output, record):
-                files.stage(staging, args.output)
+            if not is_patched:
+                record.losses = losses.of(args.output)
+                with _at_file("write", args.output, record):
+                    files.stage(staging, args.output)
         try:
             with _at_file("write", args.output or args.preview, record):
                 staging.put_in_place()
         finally:
             record.files = staging.placed
+
+
+def _patch(args, record, patch, staging):
+    """Whether the patched file waits in `staging`; if not, it is to be exported, and `record` says why."""
+    try:
+        patch.stage(staging, args.output, record.done)
+    except PatchError as refusal:
+        if args.write:
+            raise FileError(f"it cannot be patched, {refusal}: use --write export") from None
+        record.write, record.not_patched = "export", str(refusal)
+    return not record.not_patched
 
 
 def _keep(args, record):
@@ -291,7 +308,8 @@ def _check_paths(args):
             raise UsageError(f"there is no file {args.input}")
     report = args.json if str(args.json) != "-" else None
     places = {}
-    for path in filter(None, (args.output, _sibling(args.output), report, args.preview)):
+    sibling = None if args.write == "patch" else _sibling(args.output)
+    for path in filter(None, (args.output, sibling, report, args.preview)):
         place = os.path.realpath(path)
         if place in places:
             args.json = None

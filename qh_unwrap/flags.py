@@ -92,6 +92,12 @@ def parser():
     made.add_argument(
         "--preview", type=Path, metavar="FILE", help="draw the model and its UVs, checkered, into a .png or .jpg file"
     )
+    made.add_argument(
+        "--write",
+        choices=("patch", "export"),
+        help="patch: change nothing in the file but the UVs, if it is an .obj, .glb, .gltf or .usd file and stays one;"
+        " export: write it anew by Blender's exporter (default: patch if that can be done, within Blender export)",
+    )
     made.add_argument("--overwrite", action="store_true", help="replace files that exist")
     made.add_argument("--strict", action="store_true", help="count islands that are not certified as failed")
     loudness = made.add_mutually_exclusive_group()

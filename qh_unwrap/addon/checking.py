@@ -191,11 +191,11 @@ def _usda(path):
 
 
 def _usd_faces(path):
-    """The number of faces, None where Pixar's library is not there to ask; Blender has it, as a package it lacks it."""
-    try:
-        from pxr import Usd, UsdGeom
-    except ImportError:
+    """The number of faces, None as a package, which lacks Pixar's library; what is installed is another copy of it."""
+    if not bpy.app.binary_path:
         return None
+    from pxr import Usd, UsdGeom
+
     stage = Usd.Stage.Open(str(path))
     meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
     return sum(len(mesh.GetFaceVertexCountsAttr().Get() or ()) for mesh in meshes)

@@ -177,6 +177,10 @@ class Maps:
                 )
             layers.active = layers[layer.name]
 
+    def are_made(self, obj):
+        """Whether the object's map is one that was missing."""
+        return obj in self._made
+
     def restore(self, done):
         """Make active again what was so, and remove maps that were made for an object of which nothing is done."""
         for obj, name in self._made.items():

@@ -33,6 +33,8 @@ class Record:
         self.warnings = []  # what Blender says of the files
         self.losses = []  # what the format of the output does not hold: `losses.Loss`
         self.cuts = []  # the new seams of each mesh, as a dictionary
+        self.write = None  # "patch" or "export"
+        self.not_patched = None  # why it is an export where a patch was to be
         self.files = []
         self.is_kept = False  # in a file, for the time being
         self.exit_code = None
@@ -76,9 +78,11 @@ class Record:
         return [f"Blender warns: {text}" for text in self.warnings]
 
     def sentences(self):
-        """A line for each reason to skip objects, for each kind of what is not written, and for each warning."""
+        """A line for each reason to skip objects, for an export in place of a patch, for each kind of what is not written,
+        and for each warning."""
         skipped = [f"skipped: {words.told_of(reason, names)}" for reason, names in self.skipped.items()]
-        return [*skipped, *(loss.message for loss in self.losses), *self.warning_sentences()]
+        exported = [f"exported, not patched: {self.not_patched}"] if self.not_patched else []
+        return [*skipped, *exported, *(loss.message for loss in self.losses), *self.warning_sentences()]
 
     def to_dict(self):
         """JSON-ready; what is infinite, as the energy of flipped faces, is None, since JSON knows no such number."""
@@ -94,6 +98,8 @@ class Record:
             input=self.input,
             output=self.output,
             files=[str(path) for path in self.files],
+            write=self.write,
+            not_patched=self.not_patched,
             times={name: round(seconds, 3) for name, seconds in self._times.items()}
             | dict(total=round(perf_counter() - self._start, 3)),
             versions=dict(

@@ -116,7 +116,7 @@ def _read(obj, mesh, uv_name, options, vertex_group):
     shown = np.array(obj.matrix_world.to_3x3()) if options.correct_scale else np.eye(3)
     uv, pinned = None, np.zeros(len(mesh.loops), dtype=bool)
     if uv_name is not None:
-        uv = _get(mesh.uv_layers[uv_name].uv, "vector", np.float32, 2).astype(np.float64)
+        uv = uvs(mesh, uv_name).astype(np.float64)
         pins = mesh.attributes.get(f".pn.{uv_name}")  # in Blender 4, asking the layer for its pins would make this
         if pins is not None:
             pinned = _get(pins.data, "value", bool)
@@ -169,6 +169,11 @@ def _weights(obj, mesh, name):
             if each.group == group.index:
                 weights[k] = each.weight
     return weights
+
+
+def uvs(mesh, name):
+    """(c, 2) float32 the UVs of the map with this name."""
+    return _get(mesh.uv_layers[name].uv, "vector", np.float32, 2)
 
 
 def _shapes(obj, shown):

@@ -219,7 +219,8 @@ def _mark(cut, works):
     if cut.mesh.welded_edge is not None:
         beside = beside[cut.mesh.welded_edge]
     cut.new &= beside
-    mesh_arrays.mark_seams(cut.target.obj, cut.new)
+    if cut.new.any():
+        mesh_arrays.mark_seams(cut.target.obj, cut.new)
 
 
 def pack_apart(targets: Sequence[Target], options: MeshOptions, context: bpy.types.Context) -> None:

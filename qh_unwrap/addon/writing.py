@@ -77,7 +77,7 @@ class Staging:
         with stopping.undisturbed():
             try:
                 for file, _, place in self._waiting:
-                    place.parent.mkdir(exist_ok=True)
+                    place.parent.mkdir(parents=True, exist_ok=True)
                     kept = self._kept(file, place)
                     os.replace(file, place)
                     replaced.append((place, kept))

@@ -52,7 +52,7 @@ def test_round_trip(tmp_path, suffix):
     (old,) = files.load(source)
     name, materials, points = old.name, [slot.name for slot in old.material_slots], world_points(old)
     assert len(points) == 25
-    assert main([str(source), "-o", str(target), "--weld", "--placement", "unit"]) == 0
+    assert main([str(source), "-o", str(target), "--weld", "--placement", "unit", "--write", "export"]) == 0
     (new,) = files.load(target)
     assert np.allclose(world_points(new), points, atol=1e-3)
     assert [slot.name for slot in new.material_slots] == materials
@@ -157,7 +157,7 @@ def test_failed_writing_leaves_the_old_file(tmp_path, monkeypatch):
         raise RuntimeError("disk full")
 
     monkeypatch.setitem(files.WRITERS, ".obj", half)
-    assert main([str(source), "-o", str(target), "--overwrite"]) == 3
+    assert main([str(source), "-o", str(target), "--overwrite", "--write", "export"]) == 3
     assert target.read_text() == "old"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["in.mtl", "in.obj", "out.obj"]
 

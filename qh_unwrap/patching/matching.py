@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which mesh of a file is which of Blender's, proved by the positions of all corners."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from .original import Change, Layer, PatchError
+
+_TOLERANCE = 1e-6  # of positions, by the size of the largest coordinate
+_UV_TOLERANCE = 1e-3  # of UVs that only tell meshes apart which are alike
+_NUMBER = re.compile(r"\.\d{3,}$")
+
+
+@dataclass
+class Seen:
+    """A mesh as Blender read it."""
+
+    name: str
+    order: int  # in which it was made
+    points: np.ndarray  # (n, 3)
+    corner_vertex: np.ndarray  # (c,)
+    sizes: np.ndarray  # (f,)
+    places: np.ndarray  # (k, 3) where its first corner is in the scene, for each object that shows it
+    layer: Layer | None = None  # what was worked on, None if nothing was
+    old_uv: np.ndarray | None = None  # (c, 2) float32 before that
+    uv: np.ndarray | None = None  # (c, 2) float32 now
+    changed: np.ndarray | None = None  # (f,) bool
+
+    @property
+    def corner_points(self):
+        return self.points[self.corner_vertex]
+
+
+def changes(original, seen):
+    """A `Change` for each of Blender's meshes whose UVs changed; raises `PatchError` where it is not certain which."""
+    made = {}
+    for each in seen:
+        if each.changed is None or not each.changed.any():
+            continue
+        mesh, faces = _counterpart(original, each, seen)
+        change = _change(each, mesh, faces)
+        other = made.setdefault(id(mesh), change)
+        if not np.array_equal(other.uv, change.uv, equal_nan=True):
+            raise PatchError(f"{each.name} is one mesh in the file that Blender read as several, with other UVs now")
+    return list(made.values())
+
+
+def _change(seen, mesh, faces):
+    """From the order of Blender's faces to that of the file's."""
+    start, count = _starts(mesh.sizes), seen.sizes
+    corners = np.repeat(start[faces] - _starts(count), count) + np.arange(len(seen.corner_vertex))
+    uv = np.full((len(mesh.corner_vertex), 2), np.nan, dtype=np.float32)
+    uv[corners] = seen.uv
+    changed = np.zeros(len(mesh.sizes), dtype=bool)
+    changed[faces] = seen.changed
+    return Change(mesh, seen.layer, uv, changed)
+
+
+def _starts(sizes):
+    return np.cumsum(sizes) - sizes
+
+
+def _counterpart(original, seen, everything):
+    """The mesh of the file, and the number of each face in it."""
+    stem = _stem(seen.name)
+    named = [mesh for mesh in original.meshes if _stem(mesh.name) == stem]
+    alike = sorted((each for each in everything if _stem(each.name) == stem), key=lambda each: each.order)
+    refusals = [mesh.refusal for mesh in named or original.meshes if mesh.refusal]
+    if len(named) == len(alike) and (len(named) == 1 or named[0].places is None):
+        mesh = named[alike.index(seen)]
+        if mesh.refusal:
+            raise PatchError(mesh.refusal)
+        faces = _faces(seen, mesh)
+        if faces is not None and _has_uv(original, mesh, seen, faces):
+            return mesh, faces
+    found = [(mesh, faces) for mesh in original.meshes if (faces := _faces(seen, mesh)) is not None]
+    found = [(mesh, faces) for mesh, faces in found if _has_uv(original, mesh, seen, faces)]
+    for narrower in (lambda mesh: _is_there(mesh, seen), lambda mesh: mesh.name == seen.name):
+        if len(found) > 1:
+            found = [each for each in found if narrower(each[0])] or found
+    if not found:
+        raise PatchError(refusals[0] if refusals else f"Blender's faces of {seen.name} are not those in the file")
+    if len(found) > 1:
+        raise PatchError(f"the file has {len(found)} meshes that are alike, and any could be {seen.name}")
+    return found[0]
+
+
+def _stem(name):
+    return _NUMBER.sub("", name)
+
+
+def _is_there(mesh, seen):
+    """Whether an object shows the mesh at one of the places where the file has it."""
+    if mesh.places is None:
+        return True
+    size = max(np.abs(mesh.places).max(), np.abs(seen.places).max(), 1e-30)
+    distances = np.abs(mesh.places[:, None] - seen.places[None]).max(axis=2)
+    return bool((distances <= 1e-4 * size).any())
+
+
+def _has_uv(original, mesh, seen, faces):
+    """Whether the UVs before the run are those in the file."""
+    if seen.layer.is_new or seen.old_uv is None:
+        return True
+    there = original.uv(mesh, seen.layer)
+    if there is None:
+        return False
+    corners = np.repeat(_starts(mesh.sizes)[faces] - _starts(seen.sizes), seen.sizes) + np.arange(len(seen.old_uv))
+    there, here = there[corners], seen.old_uv
+    known = ~np.isnan(there).any(axis=1)
+    return bool((np.abs(there - here) <= _UV_TOLERANCE * np.maximum(1, np.abs(here)))[known].all())
+
+
+def _faces(seen, mesh):
+    """(f,) for each of Blender's faces its number in the file's mesh; None if they are not the same."""
+    if mesh.refusal or not len(mesh.sizes):
+        return None
+    tolerance = _TOLERANCE * max(np.abs(seen.points).max(initial=0), np.abs(mesh.points).max(initial=0))
+    if np.array_equal(seen.sizes, mesh.sizes):
+        if (np.abs(seen.corner_points - mesh.corner_points) <= tolerance).all():
+            return np.arange(len(seen.sizes))
+        return None
+    return _some_faces(seen, mesh, tolerance) if len(seen.sizes) < len(mesh.sizes) else None
+
+
+def _some_faces(seen, mesh, tolerance):
+    """The same where Blender left out faces, such as those without area."""
+    if not (np.isfinite(seen.points).all() and np.isfinite(mesh.points).all()):
+        return None
+    _, first, place = np.unique(mesh.points, axis=0, return_index=True, return_inverse=True)
+    place = first[np.ravel(place)]  # of each point, the first one at its place
+    distance, nearest = cKDTree(mesh.points).query(seen.points)
+    used = np.unique(seen.corner_vertex)
+    if (distance[used] > tolerance).any():
+        return None
+    waiting = {}
+    for number, key in reversed(list(enumerate(_keys(place[mesh.corner_vertex], mesh.sizes)))):
+        waiting.setdefault(key, []).append(number)
+    faces = []
+    for key in _keys(place[nearest][seen.corner_vertex], seen.sizes):
+        if not waiting.get(key):
+            return None
+        faces.append(waiting[key].pop())
+    return np.array(faces)
+
+
+def _keys(corner_places, sizes):
+    return [tuple(part) for part in np.split(corner_places, np.cumsum(sizes)[:-1])]
