@@ -54,6 +54,10 @@ class UsdOriginal(Original):
             mesh, found = change.mesh, self._map(change.mesh, change.layer)
             if found and found[1]["is_animated"]:
                 raise PatchError(f"the UVs {found[1]['name']} of {mesh.path} change over time")
+            if found and found[1]["is_half"]:
+                raise PatchError(
+                    f"the UVs {found[1]['name']} of {mesh.path} are 16-bit floats, too coarse for new ones"
+                )
             old = self._arrays[f"{mesh.number}.uv.{found[0]}"] if found else np.zeros((len(mesh.order), 2))
             uv = np.array(old, dtype=np.float64)
             moves = ~np.isnan(change.uv).any(axis=1)

@@ -65,14 +65,21 @@ def _read(path):
             values = _at_corners(primvar, vertices, sizes)
             if values is not None:
                 arrays[f"{number}.uv.{len(maps)}"] = values
-                maps.append(dict(name=primvar.GetPrimvarName(), is_animated=primvar.ValueMightBeTimeVarying()))
+                maps.append(
+                    dict(
+                        name=primvar.GetPrimvarName(),
+                        is_animated=primvar.ValueMightBeTimeVarying(),
+                        is_half=primvar.GetTypeName() == Sdf.ValueTypeNames.TexCoord2hArray,
+                    )
+                )
+        is_left_handed = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
+        first = points[vertices[sizes[0] - 1 if is_left_handed else 0]] if len(vertices) else np.zeros(3)
         arrays |= {
             f"{number}.sizes": sizes,
             f"{number}.vertices": vertices,
             f"{number}.points": points,
-            f"{number}.places": _places(transforms, prim, points, vertices, is_y_up, to_meters),
+            f"{number}.places": _places(transforms, prim, first, is_y_up, to_meters),
         }
-        is_left_handed = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
         meshes.append(
             dict(
                 name=prim.GetName(),
@@ -107,11 +114,9 @@ def _at_corners(primvar, vertices, sizes):
     return values[where] if len(where) and where.max() < len(values) else None
 
 
-def _places(transforms, prim, points, vertices, is_y_up, to_meters):
+def _places(transforms, prim, first, is_y_up, to_meters):
     """(2, 3) where Blender shows the first corner, in units of the file and in meters: its versions differ in that."""
-    if not len(vertices):
-        return np.zeros((2, 3))
-    x, y, z = transforms.GetLocalToWorldTransform(prim).Transform(Gf.Vec3d(*map(float, points[vertices[0]])))
+    x, y, z = transforms.GetLocalToWorldTransform(prim).Transform(Gf.Vec3d(*map(float, first)))
     place = np.array((x, -z, y) if is_y_up else (x, y, z))
     return np.array([place, to_meters * place])
 
@@ -146,8 +151,6 @@ def _over(prim, name, values, index):
     api = UsdGeom.PrimvarsAPI(prim)
     old = api.GetPrimvar(name)
     kind = old.GetTypeName() if old and old.HasValue() else Sdf.ValueTypeNames.TexCoord2fArray
-    if kind == Sdf.ValueTypeNames.TexCoord2hArray:  # which rounds too much
-        kind = Sdf.ValueTypeNames.TexCoord2fArray
     primvar = api.CreatePrimvar(name, kind, UsdGeom.Tokens.faceVarying)
     for attribute in (primvar.GetAttr(), primvar.GetIndicesAttr()):
         if attribute and attribute.GetNumTimeSamples() == 1:
