@@ -14,7 +14,7 @@ _UV_TOLERANCE = 1e-3  # of UVs that only tell meshes apart which are alike
 _NUMBER = re.compile(r"\.\d{3,}$")
 
 
-@dataclass
+@dataclass(eq=False)
 class Seen:
     """A mesh as Blender read it."""
 
@@ -37,15 +37,46 @@ class Seen:
 def changes(original, seen):
     """A `Change` for each of Blender's meshes whose UVs changed; raises `PatchError` where it is not certain which."""
     made = {}
+    named, alike = _by_stem(original.meshes), _by_stem(sorted(seen, key=lambda each: each.order))
+    lookup = _Lookup(original.meshes)
     for each in seen:
         if each.changed is None or not each.changed.any():
             continue
-        mesh, faces = _counterpart(original, each, seen)
+        stem = _stem(each.name)
+        mesh, faces = _counterpart(original, lookup, each, named.get(stem, []), alike[stem])
         change = _change(each, mesh, faces)
         other = made.setdefault(id(mesh), change)
         if not np.array_equal(other.uv, change.uv, equal_nan=True):
             raise PatchError(f"{each.name} is one mesh in the file that Blender read as several, with other UVs now")
     return list(made.values())
+
+
+class _Lookup:
+    """The meshes of the file by their size and their first corner, of which there may be thousands."""
+
+    def __init__(self, meshes):
+        self._meshes = {}
+        for mesh in meshes:
+            if len(mesh.sizes) and not mesh.refusal:
+                self._meshes.setdefault((len(mesh.sizes), len(mesh.corner_vertex)), []).append(mesh)
+        self._firsts = {
+            key: np.array([mesh.points[mesh.corner_vertex[0]] for mesh in group]) for key, group in self._meshes.items()
+        }
+
+    def like(self, seen):
+        """Those that may be the same."""
+        key = len(seen.sizes), len(seen.corner_vertex)
+        if key not in self._meshes:
+            return []
+        distance = np.abs(self._firsts[key] - seen.points[seen.corner_vertex[0]]).max(axis=1)
+        return [self._meshes[key][number] for number in np.flatnonzero(distance <= _tolerance(seen))]
+
+
+def _by_stem(meshes):
+    found = {}
+    for mesh in meshes:
+        found.setdefault(_stem(mesh.name), []).append(mesh)
+    return found
 
 
 def _change(seen, mesh, faces):
@@ -63,12 +94,12 @@ def _starts(sizes):
     return np.cumsum(sizes) - sizes
 
 
-def _counterpart(original, seen, everything):
-    """The mesh of the file, and the number of each face in it."""
-    stem = _stem(seen.name)
-    named = [mesh for mesh in original.meshes if _stem(mesh.name) == stem]
-    alike = sorted((each for each in everything if _stem(each.name) == stem), key=lambda each: each.order)
-    refusals = [mesh.refusal for mesh in named or original.meshes if mesh.refusal]
+def _counterpart(original, lookup, seen, named, alike):
+    """The mesh of the file, and the number of each face in it.
+
+    named   the meshes of the file that have the name, but for the number that Blender adds
+    alike   Blender's meshes with that name, in the order in which it made them
+    """
     if len(named) == len(alike) and (len(named) == 1 or named[0].places is None):
         mesh = named[alike.index(seen)]
         if mesh.refusal:
@@ -76,12 +107,14 @@ def _counterpart(original, seen, everything):
         faces = _faces(seen, mesh)
         if faces is not None and _has_uv(original, mesh, seen, faces):
             return mesh, faces
-    found = [(mesh, faces) for mesh in original.meshes if (faces := _faces(seen, mesh)) is not None]
+    candidates = dict.fromkeys([*named, *lookup.like(seen)])
+    found = [(mesh, faces) for mesh in candidates if (faces := _faces(seen, mesh)) is not None]
     found = [(mesh, faces) for mesh, faces in found if _has_uv(original, mesh, seen, faces)]
     for narrower in (lambda mesh: _is_there(mesh, seen), lambda mesh: mesh.name == seen.name):
         if len(found) > 1:
             found = [each for each in found if narrower(each[0])] or found
     if not found:
+        refusals = [mesh.refusal for mesh in named or original.meshes if mesh.refusal]
         raise PatchError(refusals[0] if refusals else f"Blender's faces of {seen.name} are not those in the file")
     if len(found) > 1:
         raise PatchError(f"the file has {len(found)} meshes that are alike, and any could be {seen.name}")
@@ -118,12 +151,17 @@ def _faces(seen, mesh):
     """(f,) for each of Blender's faces its number in the file's mesh; None if they are not the same."""
     if mesh.refusal or not len(mesh.sizes):
         return None
-    tolerance = _TOLERANCE * max(np.abs(seen.points).max(initial=0), np.abs(mesh.points).max(initial=0))
-    if np.array_equal(seen.sizes, mesh.sizes):
-        if (np.abs(seen.corner_points - mesh.corner_points) <= tolerance).all():
-            return np.arange(len(seen.sizes))
+    if len(seen.sizes) < len(mesh.sizes):
+        return _some_faces(seen, mesh, _tolerance(seen))
+    if not np.array_equal(seen.sizes, mesh.sizes):
         return None
-    return _some_faces(seen, mesh, tolerance) if len(seen.sizes) < len(mesh.sizes) else None
+    if (np.abs(seen.corner_points - mesh.corner_points) <= _tolerance(seen)).all():
+        return np.arange(len(seen.sizes))
+    return None
+
+
+def _tolerance(seen):
+    return _TOLERANCE * np.abs(seen.points).max(initial=0)
 
 
 def _some_faces(seen, mesh, tolerance):

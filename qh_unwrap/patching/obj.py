@@ -98,7 +98,8 @@ class ObjOriginal(Original):
         found = []
         for first, last in self._face_ranges:
             corners = slice(start[first], start[last])
-            mesh = FileMesh(self._name(first), self._points, self.corner_vertex[corners], self.sizes[first:last])
+            used, vertex = np.unique(self.corner_vertex[corners], return_inverse=True)
+            mesh = FileMesh(self._name(first), self._points[used], vertex.ravel(), self.sizes[first:last])
             mesh.corners, mesh.faces = corners, slice(first, last)
             found.append(mesh)
         return found

@@ -23,7 +23,7 @@ class Layer:
     is_new: bool  # the file has nothing of the kind
 
 
-@dataclass
+@dataclass(eq=False)
 class FileMesh:
     """A mesh of the file: its faces and corners in the order, and its points in the frame, of Blender's importer."""
 
