@@ -18,7 +18,7 @@ class Pool:
         self._primitives, self._indices, self._uvs = [], [], []
 
     def add(self, primitive, index, uv):
-        """A primitive with its corners' vertices (c,), and their UVs (c, 2), NaN where the old ones stay."""
+        """A primitive with its corners' vertices (c,), and their UVs (c, 2), NaN where it does not matter."""
         self._primitives.append(primitive)
         self._indices.append(index)
         self._uvs.append(uv)
@@ -29,13 +29,14 @@ class Pool:
         number, count = attributes.get(self._semantic), self._file.json["accessors"][attributes["POSITION"]]["count"]
         index, uv = np.concatenate(self._indices), np.concatenate(self._uvs)
         old = np.zeros((count, 2), dtype=np.float32)
-        stays = np.isnan(uv).any(axis=1)
+        stays = np.zeros(len(uv), dtype=bool)
         if number is not None:
             old = self._file.values(number)[:, :2].astype(np.float32)
-            stays |= (uv == turned(old)[index]).all(axis=1)
+            stays = (uv == turned(old)[index]).all(axis=1)
         values = turned(uv) + np.float32(0)  # which makes 0 of -0
         values[stays] = old[index[stays]]
-        corner_vertex, source, values = _split(index, values, stays, old)
+        is_known, corner_vertex = ~np.isnan(uv).any(axis=1), index.copy()
+        corner_vertex[is_known], source, values = _split(index[is_known], values[is_known], stays[is_known], old)
         self._place_texcoord(number, values, is_grown=len(source) > 0)
         if len(source):
             self._grow(number, source)

@@ -87,7 +87,22 @@ def _change(seen, mesh, faces):
     uv[corners] = seen.uv
     changed = np.zeros(len(mesh.sizes), dtype=bool)
     changed[faces] = seen.changed
+    if len(faces) < len(mesh.sizes):
+        _give_to_twins(mesh, faces, uv, changed)
     return Change(mesh, seen.layer, uv, changed)
+
+
+def _give_to_twins(mesh, faces, uv, changed):
+    """Give faces that Blender left out, since others have the same vertices, the UVs of those: else they would part."""
+    corners = np.split(np.arange(len(mesh.corner_vertex)), np.cumsum(mesh.sizes)[:-1])
+    there = {frozenset(mesh.corner_vertex[corners[face]].tolist()): face for face in faces.tolist()}
+    for face in np.setdiff1d(np.arange(len(mesh.sizes)), faces).tolist():
+        vertices = mesh.corner_vertex[corners[face]].tolist()
+        twin = there.get(frozenset(vertices))
+        if twin is not None and changed[twin]:
+            places = dict(zip(mesh.corner_vertex[corners[twin]].tolist(), corners[twin].tolist(), strict=True))
+            uv[corners[face]] = uv[[places[vertex] for vertex in vertices]]
+            changed[face] = True
 
 
 def _starts(sizes):
@@ -107,7 +122,7 @@ def _counterpart(original, lookup, seen, named, alike):
         faces = _faces(seen, mesh)
         if faces is not None and _has_uv(original, mesh, seen, faces):
             return mesh, faces
-    candidates = dict.fromkeys([*named, *lookup.like(seen)])
+    candidates = lookup.like(seen) or [mesh for mesh in named if len(mesh.sizes) > len(seen.sizes)]
     found = [(mesh, faces) for mesh in candidates if (faces := _faces(seen, mesh)) is not None]
     found = [(mesh, faces) for mesh, faces in found if _has_uv(original, mesh, seen, faces)]
     for narrower in (lambda mesh: _is_there(mesh, seen), lambda mesh: mesh.name == seen.name):

@@ -187,6 +187,27 @@ def test_gltf_meshes_that_are_alike(tmp_path):
         assert alike(read(tmp_path / "out.glb"), result, 6e-8)
 
 
+def test_faces_that_blender_leaves_out(tmp_path):
+    """Doubled ones follow those that they double, lest they part from them; those without area split no vertex."""
+    made = Builder()
+    points, texcoords, triangles = grid(6)
+    triangles = np.concatenate([triangles[:20], [(3, 3, 4)], triangles[20:], triangles[:5, ::-1], [(1, 2, 1)]])
+    attributes = dict(POSITION=made.accessor(points, bounds=True), TEXCOORD_0=made.accessor(texcoords))
+    made.mesh(dict(attributes=attributes, indices=made.accessor(triangles.ravel().astype(np.uint8))))
+    path = made.write(tmp_path / "in.glb")
+    run(path, tmp_path / "out.glb")
+    result = shown()
+    assert [len(each) for each in result.values()] == [3 * 72]
+    assert alike(read(tmp_path / "out.glb"), result, 6e-8)
+    assert Parsed(tmp_path / "out.glb").text == Parsed(path).text
+
+
+def test_a_polygon_that_blender_takes_apart_is_no_patch(tmp_path):
+    path = tmp_path / "in.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0\nf 1 2 2 3 4\nf 2 5 6 3\n")
+    assert "faces of in are not those" in qh_unwrap.unwrap_file(path, tmp_path / "out.obj")["not_patched"]
+
+
 @needs_usd
 @pytest.mark.parametrize(("suffix", "name"), [(".usda", "New one"), (".usdc", "st"), (".usd", "st")])
 def test_usd(tmp_path, suffix, name):
