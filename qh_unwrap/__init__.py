@@ -38,7 +38,7 @@ def unwrap_file(path, output=None, **options):
     """Unwrap a file and write it to `output`, if that is given, as the command line does.
 
     path      a file that Blender reads, or "suzanne"; it is opened in place of what is open in Blender
-    options   named like the flags, with underscores: `boundary="CIRCLE"`, `uv_map="Lightmap"`, `overwrite=True`; those
+    options   named like the flags, with underscores: `boundary="CIRCLE"`, `uv_map="Lightmap"`, `write="patch"`; those
               that may be repeated (`object`, `collection`, `material`) are a text or a list of texts
 
     Returns the dictionary that `--json` writes.  Its `exit_code` is 0 if all is well, 1 if some islands failed, and 3,

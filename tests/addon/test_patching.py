@@ -243,6 +243,21 @@ def test_usd_in_place(tmp_path, suffix):
 
 
 @needs_usd
+def test_usd_that_is_referenced_gets_its_uvs_in_the_file_that_was_read(tmp_path):
+    parts, path = tmp_path / "Тест a.usda", tmp_path / "root.usda"
+    parts.write_text(USD.replace("texCoord2f[]", "float2[]", 1).replace('"Left"', '"Größe"'), encoding="utf-8")
+    text = (
+        '#usda 1.0\n(\n    upAxis = "Z"\n)\n\ndef Xform "Root" (\n    prepend references = @./Тест a.usda@\n)\n{\n}\n'
+    )
+    path.write_text(text, encoding="utf-8")
+    old = parts.read_bytes()
+    run(path, path, overwrite=True)
+    result = shown()
+    assert alike(read(path), result) and len(result) == 2 and parts.read_bytes() == old
+    assert "float2[] primvars:st" in path.read_text(encoding="utf-8")
+
+
+@needs_usd
 def test_usd_instances_stay(tmp_path):
     """Blender shows them as instances of a collection, which are not unwrapped."""
     mesh = "int[] faceVertexCounts = [3]\nint[] faceVertexIndices = [0, 1, 2]\n"
