@@ -78,8 +78,8 @@ class Record:
         return [f"Blender warns: {text}" for text in self.warnings]
 
     def sentences(self):
-        """A line for each reason to skip objects, for an export in place of a patch, for each kind of what is not written,
-        and for each warning."""
+        """A line for each reason to skip objects, for an export in place of a patch, for each kind of what is not
+        written, and for each warning."""
         skipped = [f"skipped: {words.told_of(reason, names)}" for reason, names in self.skipped.items()]
         exported = [f"exported, not patched: {self.not_patched}"] if self.not_patched else []
         return [*skipped, *exported, *(loss.message for loss in self.losses), *self.warning_sentences()]
