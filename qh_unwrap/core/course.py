@@ -15,6 +15,7 @@ from .certificate import certified_pieces, wrong_pieces
 from .chart import Surface
 from .domain import Fixed, Plane, airs_around, loose, outlined, rigid
 from .energy import energies
+from .errors import SingularError
 from .improvement import ISOMETRIC, D, Group, Improvement, Steps
 from .pins import lead
 from .settings import Settings
@@ -134,10 +135,7 @@ class Course(Improvement):
         start, certified, to_lead = batch.uv, None, np.zeros(p, bool)
         if settings.initial == "AUTO":
             good = batch.has_pins & ~wrong_pieces([surface], start)
-            if (batch.has_pins & ~good).any():
-                before = before_pins(surface, start, batch.pinned)
-                to_lead = batch.has_pins & ~good & ~wrong_pieces([surface], before)
-                start = np.where(batch.rows(to_lead)[:, None], before, start)
+            start, to_lead = self._before_pins(batch.has_pins & ~good)
             new = ~(good | to_lead)
             if new.any():
                 start = start.copy()
@@ -263,6 +261,21 @@ class Course(Improvement):
         return Group(domain, domain.start(uv), np.flatnonzero(pieces), rows)
 
     # Pins that moved
+
+    def _before_pins(self, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The given maps, of the chosen pieces as they may have been before pins were moved; and in which pieces, (p,)
+        bool, that is a map without flips from which these can be led."""
+        batch = self.batch
+        start, found = batch.uv.copy(), np.zeros(len(pieces), bool)
+        for k in np.flatnonzero(pieces):  # each by itself, since equations may have no solution
+            its, one = batch.rows_of(int(k)), batch.surface.one(int(k))
+            try:
+                before = before_pins(one, batch.uv[its], batch.pinned[its])
+            except SingularError:
+                continue
+            if not wrong_pieces([one], before).any():
+                start[its], found[k] = before, True
+        return start, found
 
     def _put_pins(self, uv: np.ndarray, pieces: np.ndarray) -> None:
         """Put the pins of the chosen pieces, (p,) bool, in their places in the map `uv` (n, 2)."""

@@ -12,6 +12,7 @@ from qh_unwrap.core import (
     Surface,
     UnwrapError,
     Unwrapper,
+    course,
     distortion,
     errors,
     locality,
@@ -19,6 +20,7 @@ from qh_unwrap.core import (
     unwrap_islands,
 )
 from qh_unwrap.core.energy import density, map_scale
+from qh_unwrap.core.stepping import finished
 from qh_unwrap.core.tensor import jacobian
 
 from . import shapes
@@ -173,6 +175,26 @@ def test_all_follows_one_pin_that_was_dragged_where_it_stretches_much(far):
         np.testing.assert_array_equal(result.uv[pinned], dragged[pinned])
         assert result.report.injective and not result.report.warnings
         assert result.report.after.symmetric_dirichlet < 2 * distortion(*mesh, uv).symmetric_dirichlet
+
+
+def test_pins_everywhere_that_cross_spoil_nothing_else(monkeypatch):
+    original = course.before_pins
+
+    def before_pins(surface, uv, pinned):
+        if np.logical_and.reduceat(pinned.all(axis=1), surface.vertex_starts).any():  # which rounding may hide
+            raise errors.SingularError("its equations have no solution")
+        return original(surface, uv, pinned)
+
+    monkeypatch.setattr(course, "before_pins", before_pins)
+    square, halves = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float), np.array([(0, 1, 2), (0, 2, 3)])
+    crossed = Shape(square, halves, square[[0, 2, 1, 3], :2], np.ones(4, bool))
+    mesh = shapes.bump(1, inner=50, outer=20)
+    uv, pinned = unwrap(*mesh).uv, np.zeros(70, bool)
+    pinned[[3, 30]] = True
+    uv[30] += 0.2
+    bad, good = finished(unwrap_islands([crossed, Shape(*mesh, uv, pinned)]))
+    np.testing.assert_array_equal(bad.uv, crossed.uv)
+    assert not bad.report.injective and good.report.injective
 
 
 def test_pins_can_be_set_on_what_is_shown(bump):
