@@ -19,7 +19,19 @@ def run(tmp_path, capfd):
 
     def run(source, output, *arguments):
         numbers = tmp_path / "report.json"
-        main([str(source), "-o", str(tmp_path / output), "--json", str(numbers), "--overwrite", *arguments])
+        main(
+            [
+                str(source),
+                "-o",
+                str(tmp_path / output),
+                "--json",
+                str(numbers),
+                "--overwrite",
+                "--write",
+                "export",
+                *arguments,
+            ]
+        )
         return json.loads(numbers.read_text()), capfd.readouterr().out.splitlines()
 
     return run

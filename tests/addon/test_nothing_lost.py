@@ -24,7 +24,7 @@ def folder(tmp_path):
 def through(source, name="out"):
     """Run it to a file beside the source; returns that."""
     target = source.with_name(f"{name}{source.suffix}")
-    assert main([str(source), "-o", str(target), "--placement", "unit"]) == 0
+    assert main([str(source), "-o", str(target), "--placement", "unit", "--write", "export"]) == 0
     return target
 
 
@@ -117,7 +117,7 @@ def test_uv_maps(folder):
         source = folder / f"maps{suffix}"
         rich.write(source)
         target = folder / f"out{suffix}"
-        assert main([str(source), "-o", str(target), "--texcoord", "1", "--object", "Haut"]) == 0
+        assert main([str(source), "-o", str(target), "--texcoord", "1", "--object", "Haut", "--write", "export"]) == 0
         (old, old_active), (new, new_active) = map(maps_of_skin, (source, target))
         assert len(old) == len(new) == 2 and old_active == new_active, suffix
         assert np.allclose(old[0], new[0], atol=1e-5), suffix
