@@ -52,7 +52,8 @@ class QH_OT_unwrap(_OnSelectedFaces, properties.OperatorProperties, bpy.types.Op
         except SettingsError as error:
             self.report({'ERROR'}, str(error))
             return None
-        return jobs.cut_and_unwrap(targets, settings, options, context)
+        seams = context.scene.qh_seams
+        return jobs.cut_and_unwrap(targets, settings, options, context, seams.seam_settings(), seams.seam_options())
 
     def finish(self, result):
         return telling.tell(self, *result)

@@ -69,6 +69,19 @@ def test_where_needed_only_what_cannot_be_unwrapped_is_cut():
     assert all(report["injective"] for report in qh_unwrap.last_report())
 
 
+def test_the_unwrap_cuts_with_the_settings_of_the_panel():
+    energies, seams_of = {}, bpy.context.scene.qh_seams
+    for bound in (1.3, 1.03):
+        sphere()
+        seams_of.distortion = bound
+        assert bpy.ops.uv.qh_unwrap(cut='DISTORTION') == {'FINISHED'}
+        (report,) = qh_unwrap.last_report()
+        energies[bound] = report["after"]["symmetric_dirichlet"]
+        bpy.data.objects.remove(bpy.context.object)
+    seams_of.property_unset("distortion")
+    assert energies[1.03] <= 1.03 < energies[1.3] <= 1.3
+
+
 def test_a_bound_that_holds_already_needs_no_cut():
     grid = add_grid(4)
     assert bpy.ops.uv.qh_seams(distortion=1.5) == {'FINISHED'}
