@@ -294,7 +294,7 @@ def _sheet(size):
 
 
 _BUTTONS = {"Unwrap": 43, "Layout": 161, "Mesh": 289, "Advanced": 314}  # pixels below the top of the sidebar
-_ADVANCED_BELOW_MESH = 443  # the same, where the section Mesh is open
+_ADVANCED_BELOW_MESH = 468  # the same, where the section Mesh is open
 
 
 def _add(gui, add, is_seam):
