@@ -8,7 +8,8 @@ import numpy as np
 
 from ..core import Settings
 from ..core.seam_settings import SeamSettings
-from ..core.seams import SeamResult, cut_open, cut_to
+from ..core.seams import cut_open, cut_to
+from ..core.searching import ChartSeams
 from ..core.stepping import mapped
 from ..core.triangles import areas_in_space
 from . import mesh_arrays
@@ -24,7 +25,8 @@ class Cut:
     target: Target
     mesh: mesh_arrays.MeshArrays  # whose seams are the old and the new ones
     new: np.ndarray  # (e,) bool, the edges that are to be marked
-    result: SeamResult
+    charts: list[ChartSeams]
+    corner_uv: np.ndarray  # (c, 2) the maps that were found, as in `SeamResult`
 
     @property
     def area(self):
@@ -33,10 +35,18 @@ class Cut:
         triangles = self.mesh.corner_vertex[self.mesh.corner_triangles[chosen]]
         return float(areas_in_space(self.mesh.vertices, triangles).sum())
 
+    @property
+    def length(self):
+        """Of all seams between two of the target's faces, each edge once, by the root of the area."""
+        chosen = self.target.faces[self.mesh.corner_faces]
+        uses = np.bincount(self.mesh.corner_edge[chosen], minlength=len(self.mesh.seam))
+        lengths = self.mesh.polygons(self.target.faces).lengths
+        return float(lengths[self.mesh.seam & (uses > 1)].sum() / self.area**0.5) if self.area > 0 else 0.0
+
     def to_dict(self):
         """JSON-ready; every edge by its vertices."""
         ends = mesh_arrays.edge_vertices(self.target.obj)[self.new]
-        return dict(object=self.target.obj.name, length=self.result.length, edges=ends.tolist())
+        return dict(object=self.target.obj.name, length=self.length, edges=ends.tolist())
 
 
 def find(target, until, seam_settings, seam_options, options, settings):
@@ -49,21 +59,44 @@ def find(target, until, seam_settings, seam_options, options, settings):
     mesh = mesh_arrays.read(target.obj, options, seam_options.vertex_group)
     yield 0.0
     polygons = mesh.polygons(target.faces)
+    wishes, free = mesh.wishes, _free(settings)
     if until == 'NEEDED':
-        # What has to be cut is cut until it has a map, however much that stretches; the rest is not looked at again.
-        opened = cut_open(polygons, seam_settings, mesh.wishes)
-        target = target._replace(faces=_to_cut(opened, mesh))
-        polygons = mesh.polygons(target.faces)
-        seam_settings = dataclasses.replace(seam_settings, distortion=_ANY)
-    steps = cut_to(polygons, seam_settings, mesh.wishes, _free(settings))
-    result = yield from mapped(lambda state: state.done, steps)
-    seams = result.seams | mesh.seam
+        results = yield from _until_certified(mesh, polygons, seam_settings, wishes, free)
+    else:
+        results = [(yield from mapped(lambda state: state.done, cut_to(polygons, seam_settings, wishes, free)))]
+    seams, corner_uv = mesh.seam.copy(), np.full((len(mesh.corner_vertex), 2), np.nan)
+    for result in results:  # what a later one cuts was cut in vain before
+        has_map = ~np.isnan(result.corner_uv[:, 0])
+        beside = mesh.corner_edge[has_map]
+        seams[beside] = result.seams[beside]
+        corner_uv[has_map] = result.corner_uv[has_map]
     if mesh.welded_edge is not None:
         seams = (np.bincount(mesh.welded_edge, seams, len(seams)) > 0)[mesh.welded_edge]
-    return Cut(target, dataclasses.replace(mesh, seam=seams), seams & ~mesh.seam, result)
+    charts = [chart for result in results[:-1] for chart in result.charts if _is_final(chart)] + results[-1].charts
+    cut_mesh = dataclasses.replace(mesh, seam=seams)
+    return Cut(target, cut_mesh, seams & ~mesh.seam, charts, corner_uv)
 
 
-_ANY = 100.0  # distortion, more than that of any map that is worth having
+_BOUNDS = (100.0, 2.0, 1.1)  # distortions to try: at the first, hardly any map that is worth having is cut again
+
+
+def _until_certified(mesh, polygons, settings, wishes, free):
+    """The `SeamResult`s of what has to be cut, at ever smaller distortions of the pieces that had no certified map."""
+    results, faces = [], _to_cut(cut_open(polygons, settings, wishes), mesh)
+    for bound in _BOUNDS:
+        steps = cut_to(mesh.polygons(faces), dataclasses.replace(settings, distortion=bound), wishes, free)
+        results.append((yield from mapped(lambda state: state.done, steps)))
+        left = [chart.faces for chart in results[-1].charts if not _is_final(chart)]
+        if not left:
+            break
+        faces = np.zeros(len(faces), dtype=bool)
+        faces[np.concatenate(left)] = True
+    return results
+
+
+def _is_final(chart):
+    """Whether nothing more can be done for it: it has a certified map, or cannot have any."""
+    return chart.certified or chart.error is not None
 
 
 def _to_cut(opened, mesh):
@@ -95,7 +128,7 @@ def summary(cuts, charts):
     edges = sum(int(cut.new.sum()) for cut in cuts)
     if not edges:
         return "No new seams are needed"
-    length = _joined([cut.result.length for cut in cuts], [cut.area for cut in cuts])
+    length = _joined([cut.length for cut in cuts], [cut.area for cut in cuts])
     text = f"{count(edges, 'edge')} marked as {'a seam' if edges == 1 else 'seams'}, {count(charts, 'island')}"
     return f"{text}, seam length {length:.2f} (relative to the root of the area)"
 
@@ -109,7 +142,7 @@ def _joined(lengths, areas):
 def remarks(cuts):
     """What there is to say of the charts, as pairs of names and sentences."""
     for cut in cuts:
-        charts = cut.result.charts
+        charts = cut.charts
         for number, chart in enumerate(charts, start=1):
             name = cut.target.obj.name if len(charts) == 1 else f"{cut.target.obj.name}, piece {number}"
             for text in (*([str(chart.error)] if chart.error else []), *chart.warnings):

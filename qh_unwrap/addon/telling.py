@@ -24,7 +24,7 @@ def tell_of_seams(operator, cuts):
     *lines, last = _of_cuts([], cuts)
     for line in lines:
         operator.report({'INFO'}, line)
-    failed = any(chart.error for cut in cuts for chart in cut.result.charts)
+    failed = any(chart.error for cut in cuts for chart in cut.charts)
     if failed and not any(cut.new.any() for cut in cuts):
         operator.report({'ERROR'}, lines[0])
         return {'CANCELLED'}
@@ -43,4 +43,4 @@ def _of_cuts(outcomes, cuts):
             told.setdefault(text, []).append(name)
     for text, names in told.items():
         yield f"{listed(names)}: {text}"
-    yield cutting.summary(cuts, len(outcomes) or sum(len(cut.result.charts) for cut in cuts))
+    yield cutting.summary(cuts, len(outcomes) or sum(len(cut.charts) for cut in cuts))

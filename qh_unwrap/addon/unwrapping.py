@@ -40,7 +40,7 @@ def unwrap_targets(
         cut = cuts.get(target.obj)
         its = list(_works(target, cut.mesh if cut else mesh_arrays.read(target.obj, options), settings))
         for work in its if cut else ():
-            work.has_new_seams = bool(cut.new[cut.mesh.corner_edge[work.island.corners]].any())
+            _take(cut, work)
         works += its
     yield from mapped(lambda share: _UNWRAPPING * share, _unwrap(works))
     if _are_as_read(works):
@@ -96,6 +96,16 @@ def _works(target, mesh, settings):
         yield Work(target, mesh, island, outcome, settings, hanging)
 
 
+def _take(cut, work):
+    """Let an island know of the seams that it is to get, and of the map that was found with them."""
+    island = work.island
+    work.has_new_seams = bool(cut.new[cut.mesh.corner_edge[island.corners]].any())
+    found = np.full((len(island.vertices), 2), np.nan)
+    found[island.corner_vertex] = cut.corner_uv[island.corners]
+    if work.has_new_seams and not np.isnan(found).any():
+        work.found_uv = found
+
+
 def _unwrap(works):
     """Unwrap the islands, all of the same settings at once; yields the share that is done."""
     shapes: dict[Settings, list[tuple[Work, Shape]]] = {}
@@ -122,6 +132,10 @@ def _unwrap(works):
 def _shape(work):
     """The settings and the shape that the core gets for an island."""
     settings, uv, pinned = work.settings, work.old_uv, work.pinned
+    if work.found_uv is not None and settings.boundary == 'FREE' and settings.initial == 'AUTO' and not pinned.any():
+        # A start that is valid: another one may not lead to a map that is.
+        settings = dataclasses.replace(settings, initial='CURRENT', iterations=0)
+        return settings, Shape(work.vertices, work.triangles, work.found_uv, face=work.triangle_faces)
     if work.is_attached:
         if settings.boundary == 'FREE':
             pinned = pinned | work.attached_vertices
@@ -169,7 +183,7 @@ def _keep(work, result):
     report, outcome = result.report, work.outcome
     work.uv, work.loops, work.mirrored = result.uv, result.loops, report.mirrored
     work.certified = report.injective
-    outcome.before, outcome.after = report.before, report.after
+    outcome.before, outcome.after = None if work.found_uv is not None else report.before, report.after
     outcome.iterations, outcome.converged = report.iterations, report.converged
     # To the core, vertices that faces hang on which are not selected are pins.
     hanging = work.is_attached and not work.pinned.any()

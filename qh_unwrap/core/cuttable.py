@@ -106,6 +106,7 @@ class Cuttable(HalfEdges):
     points : (n, 3), moved and scaled so that the area is 1
     triangles, edges, triangle_edges : as those of a `Topology`, which is `topology`
     mesh_vertex : (n,), mesh_face : (m,)
+    mesh_corners : (m, 3), the mesh's corners of each triangle
     mesh_edge : (k,), the mesh's edge, or -1 for a diagonal of a face
 
     Raises the `SurfaceError` of what no cut can mend.
@@ -121,6 +122,7 @@ class Cuttable(HalfEdges):
         for fault in (*faults, *flat.values()):
             raise fault
         self.triangles, self.triangle_edges, self.edges = topology.triangles, topology.triangle_edges, topology.edges
+        self.mesh_corners = island.triangle_corners
         self.mesh_vertex, self.mesh_face = island.vertices, face[island.triangle_corners[:, 0]]
         self.area = float(areas_in_space(points, topology.triangles).sum())
         start = island.triangle_corners.T.ravel()

@@ -46,6 +46,8 @@ class SeamResult:
     """The mean energy of all charts that have a map, weighted by their areas at one scale; NaN if there is none."""
     length: float
     """Of the seams between two selected faces, each edge once, by the root of these faces' area."""
+    corner_uv: np.ndarray = field(repr=False)
+    """(c, 2), the maps of the charts at the mesh's corners, each in its own unit square; NaN where there is none."""
 
 
 def cut_open(polygons: Polygons, settings: SeamSettings | None = None, wishes: Wishes | None = None) -> SeamResult:
@@ -94,7 +96,7 @@ def _search(polygons, settings, wishes, unwrap_settings, triangulate, unwrapping
     settings, wishes = settings or SeamSettings(), wishes or Wishes()
     wishes.check(len(polygons.vertices), len(polygons.seam))
     if not polygons.selected.any():
-        yield SeamResult(polygons.seam.copy(), [], float("nan"), 0.0)
+        yield SeamResult(polygons.seam.copy(), [], float("nan"), 0.0, _nowhere(polygons))
         return
     if settings.charts > 1:
         polygons = polygons.with_seams(polygons.seam | _splits(polygons, settings, wishes))
@@ -160,7 +162,15 @@ def _result(polygons, islands, searches, seams):
     uses = np.bincount(polygons.corner_edge[_chosen_corners(polygons)], minlength=len(seams))
     area = sum(each.area for each in searches)
     length = polygons.lengths[seams & (uses > 1)].sum()
-    return SeamResult(seams, charts, _mean(searches), float(length / np.sqrt(area)) if area > 0 else 0.0)
+    corner_uv = _nowhere(polygons)
+    for each in searches:
+        each.put_map(corner_uv)
+    length = float(length / np.sqrt(area)) if area > 0 else 0.0
+    return SeamResult(seams, charts, _mean(searches), length, corner_uv)
+
+
+def _nowhere(polygons):
+    return np.full((len(polygons.corner_vertex), 2), np.nan)
 
 
 def _mean(searches):

@@ -224,6 +224,11 @@ class Search:
                 )
         self.ended, self.done = True, 1.0
 
+    def put_map(self, corner_uv: np.ndarray) -> None:
+        """Write the map, if there is one, to the mesh's corners in `corner_uv` (c, 2)."""
+        if self._result is not None and self._growth is not None:
+            corner_uv[self._mesh.mesh_corners] = self._result.uv[self._mesh.opened(self._growth.cut).triangles]
+
     def chart(self, faces: np.ndarray, polygons: Polygons) -> ChartSeams:
         """What has become of the island, whose `faces` (f',) these are."""
         result = self._result

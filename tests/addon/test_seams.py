@@ -2,6 +2,7 @@
 """Seams that are found: the operator that marks them, the option of the unwrap, the button, the command line."""
 
 import bpy  # isort: skip
+import dataclasses
 import json
 
 import bmesh
@@ -10,10 +11,11 @@ import pytest
 from scenes import add_cube, add_grid, changes, edit_mode, snapshot, uvs
 
 import qh_unwrap
-from qh_unwrap.addon import files, jobs, selection, unwrapping
+from qh_unwrap.addon import cutting, files, jobs, selection, unwrapping
 from qh_unwrap.addon.options import MeshOptions, SeamOptions
 from qh_unwrap.cli import main
 from qh_unwrap.core import Settings
+from qh_unwrap.core import seams as seams_module
 from qh_unwrap.core.seam_settings import SeamSettings
 
 
@@ -80,6 +82,28 @@ def test_the_unwrap_cuts_with_the_settings_of_the_panel():
         bpy.data.objects.remove(bpy.context.object)
     seams_of.property_unset("distortion")
     assert energies[1.03] <= 1.03 < energies[1.3] <= 1.3
+
+
+def test_what_overlaps_itself_once_it_is_opened_is_cut_again(monkeypatch):
+    bpy.ops.mesh.primitive_torus_add(major_segments=16, minor_segments=8)
+    torus = bpy.context.object
+    add_cube().location = (5, 0, 0)
+    torus.select_set(True)
+    asked = []
+
+    def cut_to(polygons, settings, *others):
+        result = yield from seams_module.cut_to(polygons, settings, *others)
+        asked.append((settings.distortion, int(polygons.selected.sum())))
+        if len(asked) == 1:  # as if its map overlapped itself
+            charts = [dataclasses.replace(chart, certified=False) for chart in result.charts]
+            result = dataclasses.replace(result, charts=charts)
+        return result
+
+    monkeypatch.setattr(cutting, "cut_to", cut_to)
+    assert bpy.ops.uv.qh_unwrap(cut='NEEDED') == {'FINISHED'}
+    assert len(qh_unwrap.last_report()) == 2 and all(report["injective"] for report in qh_unwrap.last_report())
+    assert len(asked) == 3 and sorted(asked)[0][0] == 2, "only the torus at a smaller distortion"
+    assert seams(torus).sum() == 24
 
 
 def test_a_bound_that_holds_already_needs_no_cut():
