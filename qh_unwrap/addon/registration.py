@@ -23,7 +23,7 @@ _CLASSES = (
     panels.QH_PT_view_3d_report,
 )
 
-_SEAM_MENUS = (bpy.types.IMAGE_MT_uvs, bpy.types.VIEW3D_MT_edit_mesh_edges)
+_SEAM_MENUS = (bpy.types.IMAGE_MT_uvs, bpy.types.VIEW3D_MT_uv_map, bpy.types.VIEW3D_MT_edit_mesh_edges)
 
 
 def register():

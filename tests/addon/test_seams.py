@@ -11,7 +11,7 @@ import pytest
 from scenes import add_cube, add_grid, changes, edit_mode, snapshot, uvs
 
 import qh_unwrap
-from qh_unwrap.addon import cutting, files, jobs, selection, unwrapping
+from qh_unwrap.addon import cutting, files, jobs, panels, selection, unwrapping
 from qh_unwrap.addon.options import MeshOptions, SeamOptions
 from qh_unwrap.cli import main
 from qh_unwrap.core import Settings
@@ -242,6 +242,11 @@ def test_a_tube_is_told_what_a_seam_would_bring():
     bpy.ops.uv.qh_unwrap()
     (report,) = qh_unwrap.last_report()
     assert not report["warnings"] and report["after"]["l2_stretch"] == pytest.approx(1)
+
+
+@pytest.mark.parametrize("name", ["IMAGE_MT_uvs", "VIEW3D_MT_uv_map", "VIEW3D_MT_edit_mesh_edges"])
+def test_it_stands_in_the_menus(name):
+    assert panels.draw_seam_menu in getattr(bpy.types, name).draw._draw_funcs
 
 
 def test_one_undo_takes_seams_and_uvs_back():
