@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import Settings
+from ..core.cuttable import need_cuts
 from ..core.seam_settings import SeamSettings
-from ..core.seams import cut_open, cut_to
+from ..core.seams import cut_to
 from ..core.searching import ChartSeams
 from ..core.stepping import mapped
 from ..core.triangles import areas_in_space
@@ -72,7 +73,7 @@ def find(target, until, seam_settings, seam_options, options, settings):
         corner_uv[has_map] = result.corner_uv[has_map]
     if mesh.welded_edge is not None:
         seams = (np.bincount(mesh.welded_edge, seams, len(seams)) > 0)[mesh.welded_edge]
-    charts = [chart for result in results[:-1] for chart in result.charts if _is_final(chart)] + results[-1].charts
+    charts = [chart for result in results for chart in result.charts if _is_final(chart) or result is results[-1]]
     cut_mesh = dataclasses.replace(mesh, seam=seams)
     return Cut(target, cut_mesh, seams & ~mesh.seam, charts, corner_uv)
 
@@ -82,31 +83,32 @@ _BOUNDS = (100.0, 2.0, 1.1)  # distortions to try: at the first, hardly any map 
 
 def _until_certified(mesh, polygons, settings, wishes, free):
     """The `SeamResult`s of what has to be cut, at ever smaller distortions of the pieces that had no certified map."""
-    results, faces = [], _to_cut(cut_open(polygons, settings, wishes), mesh)
-    for bound in _BOUNDS:
+    results, faces = [], _to_cut(polygons, settings)
+    for bound in _BOUNDS if faces.any() else ():
         steps = cut_to(mesh.polygons(faces), dataclasses.replace(settings, distortion=bound), wishes, free)
         results.append((yield from mapped(lambda state: state.done, steps)))
-        left = [chart.faces for chart in results[-1].charts if not _is_final(chart)]
-        if not left:
-            break
         faces = np.zeros(len(faces), dtype=bool)
-        faces[np.concatenate(left)] = True
+        for chart in results[-1].charts:
+            faces[chart.faces] = not _is_final(chart)
+        if not faces.any():
+            break
     return results
+
+
+def _to_cut(polygons, settings):
+    """The faces (f,) bool of islands that are closed or have handles, or that are to be split into charts."""
+    if settings.charts > 1:
+        return polygons.selected
+    islands = polygons.islands()
+    faces = np.zeros(len(polygons.selected), dtype=bool)
+    for island, needs_cut in zip(islands, need_cuts(islands), strict=True):
+        faces[island.faces] = needs_cut
+    return faces
 
 
 def _is_final(chart):
     """Whether nothing more can be done for it: it has a certified map, or cannot have any."""
     return chart.certified or chart.error is not None
-
-
-def _to_cut(opened, mesh):
-    """The faces (f,) bool of the pieces that got new seams, or could not be opened."""
-    new = (opened.seams & ~mesh.seam)[mesh.corner_edge]
-    touched = np.bincount(mesh.corner_faces, new, len(mesh.face_start)) > 0
-    faces = np.zeros(len(touched), dtype=bool)
-    for chart in opened.charts:
-        faces[chart.faces] = chart.error is not None or touched[chart.faces].any()
-    return faces
 
 
 def _free(settings):

@@ -104,6 +104,9 @@ def _take(cut, work):
     found[island.corner_vertex] = cut.corner_uv[island.corners]
     if work.has_new_seams and not np.isnan(found).any():
         work.found_uv = found
+    for chart in cut.charts:
+        if chart.error is not None and island.faces[0] in chart.faces:
+            work.cut_fault = str(chart.error)
 
 
 def _unwrap(works):
@@ -125,6 +128,8 @@ def _unwrap(works):
             if isinstance(result, UnwrapError):
                 work.outcome.error = _explained(result, work)
                 work.outcome.needs_cut = isinstance(result, ClosedError | GenusError)
+                if work.cut_fault and work.outcome.needs_cut:
+                    work.outcome.error = work.cut_fault
             else:
                 _keep(work, result)
 

@@ -30,6 +30,7 @@ class Work:
     certified: bool = False  # by the core, before it was placed
     in_frame: bool = False  # of the old UVs, because something of them is held
     has_new_seams: bool = False  # so that its old place says nothing
+    cut_fault: str = ""  # why no seams were found that open it
     found_uv: np.ndarray | None = None  # (n, 2) those that the search for these seams ended with
 
     @cached_property

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .chart import normalised_pieces
 from .errors import ClosedError, GenusError, ShapeError, UnwrapError
 from .islands import Island, find_islands
-from .pieces import around_faces, components
+from .pieces import around_faces, components, joined
 from .topology import HalfEdges, Topology, checked_arrays
 from .triangles import areas_in_space, corners_of, normals
 
@@ -272,4 +272,15 @@ def cuttables(polygons: Polygons, islands: Sequence[Island]) -> list[Cuttable | 
             found.append(Cuttable(polygons, island))
         except UnwrapError as error:
             found.append(error)
+    return found
+
+
+def need_cuts(islands: Sequence[Island]) -> np.ndarray:
+    """Which of the islands, (p,) bool, are closed or have handles, and are sound but for that."""
+    found = np.zeros(len(islands), bool)
+    if islands:
+        its = joined([island.vertices[:, None] for island in islands], [island.triangles for island in islands])
+        vertices, triangles, starts, triangle_starts = its
+        faults = Topology(triangles, len(vertices), starts, triangle_starts).faults()
+        found[[k for k, fault in faults.items() if isinstance(fault, ClosedError | GenusError)]] = True
     return found

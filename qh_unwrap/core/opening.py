@@ -38,7 +38,7 @@ def opening(mesh: Cuttable, cost: np.ndarray, mirror: Mirror | None = None) -> t
         cut = _slit(mesh, cost, None if mirror is None else mirror.on_plane)
         kept = mesh.degrees(cut) == 1
     if np.isinf(cost[cut]).any():
-        raise ClosedError("too few of its edges may be cut to open it: allow more")
+        raise ClosedError("too few of its edges may be cut to open it: spare fewer of its vertices, or mark a seam")
     return cut if mirror is not None else shortened(mesh, cost, cut, kept), kept
 
 
@@ -105,5 +105,5 @@ def _slit(mesh, cost, plane):
         more = np.flatnonzero(np.isfinite(cost) & (mesh.edges == other).any(axis=1) & ~cut)
         cut[more[np.argmin(cost[more])] if len(more) else slice(0)] = True
     if cut.sum() < mesh.fewest:
-        raise ClosedError("too few of its edges may be cut to open it: allow more")
+        raise ClosedError("too few of its edges may be cut to open it: spare fewer of its vertices, or mark a seam")
     return cut

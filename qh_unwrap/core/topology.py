@@ -54,7 +54,11 @@ class Topology(HalfEdges):
     """
 
     def __init__(
-        self, triangles: np.ndarray, n: int, vertex_starts: Sequence[int] = (0,), triangle_starts: Sequence[int] = (0,)
+        self,
+        triangles: np.ndarray,
+        n: int,
+        vertex_starts: Sequence[int] | np.ndarray = (0,),
+        triangle_starts: Sequence[int] | np.ndarray = (0,),
     ):
         self.triangles = np.asfortranarray(triangles, dtype=np.int64)
         self.vertex_count = int(n)

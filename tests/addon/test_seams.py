@@ -165,6 +165,15 @@ def test_seams_follow_sharp_edges_and_borders_of_materials():
     assert share[0] < 0.3 < share[1] == share[2]
 
 
+def test_a_vertex_group_of_everything_is_the_reason():
+    ball = sphere()
+    ball.vertex_groups.new(name="All").add(list(range(len(ball.data.vertices))), 1.0, 'REPLACE')
+    for options in ({}, dict(unwrap=False)):
+        with pytest.raises(RuntimeError, match="too few of its edges may be cut to open it"):
+            bpy.ops.uv.qh_seams(vertex_group="All", **options)
+    assert not seams(ball).any()
+
+
 def test_unknown_vertex_group():
     cube = add_cube()
     with pytest.raises(RuntimeError, match="no vertex group Nose to spare"):

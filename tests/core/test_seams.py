@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core.branches import branches
-from qh_unwrap.core.cuttable import Cuttable, Polygons
+from qh_unwrap.core.cuttable import Cuttable, Polygons, need_cuts
 from qh_unwrap.core.edge_costs import Wishes
 from qh_unwrap.core.errors import ClosedError, SettingsError, ShapeError
 from qh_unwrap.core.foresight import Foresight
@@ -383,3 +383,9 @@ def test_wishes_must_fit_the_mesh():
 def test_settings_are_checked():
     with pytest.raises(SettingsError, match="distortion"):
         SeamSettings(distortion=1.0)
+
+
+def test_what_needs_cuts():
+    islands = [mesh.islands()[0] for mesh in (ball(), torus(), Polygons.of_triangles(*shapes.bump(1)))]
+    assert need_cuts(islands).tolist() == [True, True, False]
+    assert not len(need_cuts([]))
