@@ -81,7 +81,8 @@ def _handles(mesh, cost):
     key = low * np.int64(m + loops) + high
     order = np.lexsort((weight, key))
     kept = order[np.diff(key[order], prepend=-1) > 0]
-    graph = coo_array((weight[kept] + tiny, (low[kept], high[kept])), shape=(m + loops, m + loops))
+    ends = np.array([low[kept], high[kept]], dtype=np.int32)  # SciPy 1.15 takes no others
+    graph = coo_array((weight[kept] + tiny, tuple(ends)), shape=(m + loops, m + loops))
     tree = minimum_spanning_tree(graph.tocsr()).tocoo()
     chosen = np.isin(key[kept], tree.row.astype(np.int64) * (m + loops) + tree.col)
     left = ~in_tree
