@@ -129,7 +129,7 @@ class Growth:
             if gain > most:
                 most, chosen = gain, (cut, tips)
         if chosen is None:  # then to where the last map stretched
-            seen = np.where(np.isfinite(paths.distance), self._seen * paths.distance, 0)
+            seen = self._seen * np.where(np.isfinite(paths.distance), paths.distance, 0)
             if not seen.any():
                 return False
             chosen = self._joined(paths, int(np.argmax(seen)))

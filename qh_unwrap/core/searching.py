@@ -17,6 +17,7 @@ from .opening import opening
 from .report import Result, Shape
 from .seam_settings import SeamSettings
 
+_LOPSIDED = 2.0  # times the distortion allowed, from which on seams are rather not symmetric
 _MAPS = 12  # that are made of an island, at most, until its distortion is small enough
 _TRIMS = 5  # that are made at most to see which ends of its cut it does not need
 _CLOSE = 0.94  # of the distortion that is allowed, from which on no end is drawn back any more
@@ -112,6 +113,7 @@ class Search:
         if mirror is not None and not np.array_equal(cut, cut[mirror.edge]):
             mirror = None
             self._warnings += ("it cannot be opened symmetrically: its seams are not",)
+        self._cost, self._is_mirrored = cost, mirror is not None
         self._growth, self.ended = Growth(mesh, cost, cut, kept, mirror), not unwrapping
 
     def _mirror(self, polygons, settings):
@@ -211,6 +213,12 @@ class Search:
 
     def _end(self):
         found = self._best or self._almost
+        if self._is_mirrored and not (found.certified and found.energy - 1 <= _LOPSIDED * self._goal):
+            # Where symmetric cuts do not lead to the end, others may.
+            self._growth, self._is_mirrored = Growth(self._mesh, self._cost, *found.state), False
+            self._maps, self._found, self._aim = 0, [], self._goal
+            self._warnings += ("symmetric seams alone leave it too much distorted: some are not symmetric",)
+            return
         self._growth.restore(found.state)
         if isinstance(found.result, UnwrapError):
             self._error, self.energy = found.result, float("nan")

@@ -174,6 +174,14 @@ def test_a_vertex_group_of_everything_is_the_reason():
     assert not seams(ball).any()
 
 
+@pytest.mark.filterwarnings("error")
+def test_where_symmetric_seams_do_not_suffice_others_come_to_them():
+    bpy.ops.mesh.primitive_monkey_add()
+    assert bpy.ops.uv.qh_seams(symmetry='X', distortion=1.05) == {'FINISHED'}
+    for report in qh_unwrap.last_report():
+        assert report["injective"] and report["after"]["symmetric_dirichlet"] <= 1.05
+
+
 def test_unknown_vertex_group():
     cube = add_cube()
     with pytest.raises(RuntimeError, match="no vertex group Nose to spare"):
