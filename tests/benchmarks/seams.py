@@ -146,12 +146,13 @@ def main():
             count = len(polygons.corner_triangles)
             found[name] = count, result, certified, worked, result.length / xatlas[1], result.length / smart[1]
             figures = (f"{value:.2f}" for value in (result.length, worked, clock))
-            rows.append((name, count, result.energy, *figures, len(result.charts), certified, *xatlas, *smart))
+            counts = int(result.seams.sum()), len(result.charts), certified
+            rows.append((name, count, result.energy, *figures, *counts, *xatlas, *smart))
         if not rows:
             print("skipped: set QH_MESHES to a folder that holds the folder `closed`")
             return
         print(f"bound {bound:g}")
-        names = "energy", "length", "seconds", "clock", "charts", "certified"
+        names = "energy", "length", "seconds", "clock", "edges", "charts", "certified"
         table(("model", "triangles", *names, "xatlas", "length", "Smart UV", "length"), rows)
         _judge(verdicts, bound, list(found.values()), bound == lowest)
     verdicts.exit()
