@@ -6,7 +6,7 @@ edge once, without the mesh's boundary, and is divided by the root of the area. 
 
     QH_MESHES=folder/of/meshes python -m tests.benchmarks.seams [--bounds 1.1 1.05 1.025] [--only bunny torus]
 
-xatlas (`pip install xatlas`) and Blender (`pip install bpy`) take part where they are installed.
+xatlas (the extra `compare`) and Blender (`pip install bpy`) take part where they are installed.
 """
 
 import argparse
