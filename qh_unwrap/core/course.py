@@ -20,6 +20,7 @@ from .improvement import ISOMETRIC, D, Group, Improvement, Steps
 from .pins import lead
 from .settings import Settings
 from .starts import before_pins, best_start, natural_start, start_within, with_pins
+from .untangling import untangled
 
 PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
 PINS_FLIP = "no map without flips was found with these pins: unpin some, or move them"
@@ -126,7 +127,18 @@ class Course(Improvement):
         else:
             start = group.domain.start(np.where(held, values, current)[rows])
         group.uv = start
+        if settings.repair and settings.initial == "AUTO":
+            yield from self._untangled(group)
         yield from self.improve(group)
+
+    def _untangled(self, group: Group, before: np.ndarray | None = None) -> Steps:
+        """Turn back what is flipped in a group's maps, as far as that can be had.
+
+        before  (n, 2), the group's map in which air is at rest
+        """
+        if (self.refining or self.settings.iterations) and wrong_pieces(group.domain.charts, group.uv).any():
+            group.uv, _ = yield from untangled(group.domain, group.uv, before)
+            self.now[group.rows] = self.best[group.rows] = group.island_uv
 
     def _free(self) -> Steps:
         """With outlines that are free."""

@@ -45,22 +45,33 @@ def newton_step(
         after = uv.copy()
         after[sound[domain.vertex_piece]] = its_uv
         return uv, after, done
-    gradient, direction = _newton_direction(domain, energy, before)
+    after, value, moved = descended(domain, energy, uv, before, start, going)
+    worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
+    return uv, after, ~moved | (start - value < worth / patience)
+
+
+def descended(
+    domain: Domain, energy: Barrier, uv: np.ndarray, jacobian: np.ndarray, start: np.ndarray, going: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The map `uv` (n, 2) after Newton's step down the energy in the pieces that are `going` (p,) bool.
+
+    `jacobian` (2, 2, m) and `start` (p,) are the map's derivative and energy.  Returns the map, the energy that it was
+    last seen with, (p,), and which pieces have moved, (p,) bool.
+    """
+    gradient, direction = _newton_direction(domain, energy, jacobian)
     change = energy.jacobian(direction)
-    length = np.where(going, np.minimum(1.0, _LONGEST * energy.longest_step(before, change)), 0.0)
+    length = np.where(going, np.minimum(1.0, _LONGEST * energy.longest_step(jacobian, change)), 0.0)
     piece = domain.vertex_piece
     slope = np.bincount(piece, (gradient * direction).sum(axis=1), len(start))
     for _ in range(_HALVINGS):
-        value = energy.value(before + domain.triangles.at(length) * change)
+        value = energy.value(jacobian + domain.triangles.at(length) * change)
         steep = ~(value <= start + _ARMIJO * length * slope)
         if not steep.any():
             break
         length[steep] /= 2
     else:
         length[steep] = 0
-    after = uv + (length[0] if len(length) == 1 else length[piece, None]) * direction
-    worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
-    return uv, after, (length == 0) | (start - value < worth / patience)
+    return uv + (length[0] if len(length) == 1 else length[piece, None]) * direction, value, length > 0
 
 
 def _newton_direction(domain, energy, jacobian):

@@ -66,6 +66,9 @@ class Barrier:
     Fields are those of all charts' triangles, one chart after the other.
     """
 
+    _own: tuple[np.ndarray, ...] = ()
+    """What the density needs to know of every triangle, (m,) each."""
+
     def __init__(self, domain: Domain, uv: np.ndarray, balance: float, size: np.ndarray):
         self._domain, self._balance = domain, balance
         everything = domain.triangles
@@ -145,34 +148,43 @@ class Barrier:
         if self._void is not None:
             jacobian = np.where(self._void, np.eye(2)[:, :, None], jacobian)
         return by_parts(
-            lambda jacobian, hats, weight: _derivatives(jacobian, hats, weight, self._balance),
+            lambda jacobian, hats, weight, *own: _derivatives(
+                jacobian, hats, weight, lambda s1, s2: self._density(s1, s2, *own)
+            ),
             jacobian,
             self._hats,
             self._weight,
+            *self._own,
         )
 
+    def _density(self, s1, s2):
+        """The density of triangles with the stretches s1 and s2, (m,), and its first and second derivatives by s1 and
+        s2, divided by the density itself."""
+        p, r = exponents(self._balance)
+        det = s1 * s2
+        size, square = s1 * s1 + s2 * s2, det * det
+        beta, gamma = (square - 1) / (square + 1), 4 * square / (square + 1) ** 2
+        g1 = p * (2 * s1 / size - 1 / s1) + r * beta / s1
+        g2 = p * (2 * s2 / size - 1 / s2) + r * beta / s2
+        f11 = g1 * g1 + p * (2 / size - 4 * (s1 / size) ** 2 + 1 / s1**2) + r * (gamma - beta) / s1**2
+        f22 = g2 * g2 + p * (2 / size - 4 * (s2 / size) ** 2 + 1 / s2**2) + r * (gamma - beta) / s2**2
+        f12 = g1 * g2 - 4 * p * det / size**2 + r * gamma / det
+        return density(size, det, self._balance), g1, g2, f11, f12, f22
 
-def _derivatives(jacobian, hats, weight, balance):
-    p, r = exponents(balance)
+
+def _derivatives(jacobian, hats, weight, density):
     (a, b), (c, d) = jacobian
-    # Singular values in closed form, and the angles of the singular vectors
+    # Singular values in closed form, the second one negative where flipped, and the angles of the singular vectors
     turn, shear = np.arctan2(c - b, a + d), np.arctan2(c + b, a - d)
     left, right = (turn + shear) / 2, (turn - shear) / 2
     s1 = (np.hypot(a + d, c - b) + np.hypot(a - d, c + b)) / 2
-    det = a * d - b * c
-    s2 = det / s1
-    size, square = s1 * s1 + s2 * s2, det * det
-    beta, gamma = (square - 1) / (square + 1), 4 * square / (square + 1) ** 2
-
-    value = weight * density(size, det, balance)
-    g1 = p * (2 * s1 / size - 1 / s1) + r * beta / s1  # logarithmic derivatives
-    g2 = p * (2 * s2 / size - 1 / s2) + r * beta / s2
-    f11 = g1 * g1 + p * (2 / size - 4 * (s1 / size) ** 2 + 1 / s1**2) + r * (gamma - beta) / s1**2
-    f22 = g2 * g2 + p * (2 / size - 4 * (s2 / size) ** 2 + 1 / s2**2) + r * (gamma - beta) / s2**2
-    f12 = g1 * g2 - 4 * p * det / size**2 + r * gamma / det
-    gap = s1 - s2
+    s1 = np.maximum(s1, np.finfo(float).tiny)
+    s2 = (a * d - b * c) / s1
+    value, g1, g2, f11, f12, f22 = density(s1, s2)
+    value = weight * value
+    gap, both = s1 - s2, s1 + s2
     flip = np.where(gap > 1e-6 * s1, (g1 - g2) / np.where(gap > 0, gap, 1), f11 - f12)
-    twist = (g1 + g2) / (s1 + s2)
+    twist = np.where(both > 1e-6 * s1, (g1 + g2) / np.where(both > 0, both, 1), f11 + f12)
     f11, f12, f22 = _positive(f11, f12, f22)
     flip, twist = np.maximum(flip, _SMALLEST), np.maximum(twist, _SMALLEST)
     both, skew = (flip + twist) / 2, (flip - twist) / 2
