@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from functools import partial
 
 import numpy as np
@@ -17,7 +17,7 @@ from .domain import Fixed, Plane, airs_around, loose, outlined, rigid
 from .energy import energies
 from .errors import SingularError
 from .improvement import ISOMETRIC, D, Group, Improvement, Steps
-from .pins import lead
+from .pins import lead, way_of
 from .settings import Settings
 from .starts import before_pins, best_start, natural_start, start_within, with_pins
 from .untangling import untangled
@@ -130,6 +130,18 @@ class Course(Improvement):
         if settings.repair and settings.initial == "AUTO":
             yield from self._untangled(group)
         yield from self.improve(group)
+
+    def _forced(self, group: Group, arrived: np.ndarray) -> Generator[None, None, np.ndarray]:
+        """Put pins in their places that did not arrive there, and turn back what that flips; returns which pieces have
+        arrived now, (p',) bool."""
+        domain = group.domain
+        way = way_of(group, self.settings, together=self.batch.partner is not None)
+        rows = arrived[domain.vertex_piece, None]
+        held = domain.constrained.held & ~rows
+        moved = np.where(held, domain.constrained.values, np.where(rows, group.uv, group.uv + way))
+        moved, sound = yield from untangled(domain, moved, group.uv)
+        group.uv = np.where(sound[domain.vertex_piece, None], moved, group.uv)
+        return arrived | sound
 
     def _untangled(self, group: Group, before: np.ndarray | None = None) -> Steps:
         """Turn back what is flipped in a group's maps, as far as that can be had.
@@ -313,6 +325,8 @@ class Course(Improvement):
             if arrived.all():
                 break
             group.uv = group.domain.renewed(group.uv)
+        if not arrived.all():
+            arrived = yield from self._forced(group, arrived)
         late = np.zeros(batch.surface.piece_count, bool)
         late[group.pieces[~arrived]] = True
         if late.any():

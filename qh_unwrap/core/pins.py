@@ -22,11 +22,7 @@ def lead(group: Group, settings: Settings, together: bool) -> np.ndarray:
     """
     domain, uv = group.domain, group.uv
     constrained, piece = domain.constrained, domain.vertex_piece
-    if together:
-        weights = domain.weights(scheme(settings)(domain.charts, uv), uv)
-        way = constrained.factor(weights)(np.where(constrained.held, constrained.values - uv, 0))
-    else:
-        way = _smooth_way(domain, uv)
+    way = way_of(group, settings, together)
     part = np.ones(len(group.pieces))
     for _ in range(_HALVINGS):
         moved = uv + part[piece, None] * way
@@ -39,6 +35,16 @@ def lead(group: Group, settings: Settings, together: bool) -> np.ndarray:
         moved = np.where(wrong[piece, None], uv, moved)
     group.uv = moved
     return part == 1
+
+
+def way_of(group: Group, settings: Settings, together: bool) -> np.ndarray:
+    """How far everything goes, (n, 2), until what is held has arrived; something may well flip on the way."""
+    domain, uv = group.domain, group.uv
+    if not together:
+        return _smooth_way(domain, uv)
+    constrained = domain.constrained
+    weights = domain.weights(scheme(settings)(domain.charts, uv), uv)
+    return constrained.factor(weights)(np.where(constrained.held, constrained.values - uv, 0))
 
 
 def _smooth_way(domain: Domain, uv: np.ndarray) -> np.ndarray:
