@@ -23,9 +23,11 @@ class LastRun:
         self.options, self.unwrap_settings = MeshOptions(), Settings()
 
     def remember(self, outcomes, settings, options):
+        """Keep the outcomes of a run with these settings, of an unwrap or of anything else, and these mesh options."""
         self.outcomes[:] = outcomes
         self.settings = dataclasses.asdict(settings) | dataclasses.asdict(options)
-        self.options, self.unwrap_settings = options, settings
+        self.options = options
+        self.unwrap_settings = settings if isinstance(settings, Settings) else Settings()
         self.work_out()
 
     def work_out(self):

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operators that unwrap and that mark seams."""
+"""The operators that unwrap, mark seams, relax and straighten."""
 
 import dataclasses
 
 import bpy
 
 from ..core.errors import SettingsError
-from . import jobs, properties, selection, telling
+from . import jobs, properties, relaxing, selection, telling
 from .outcome import latest
 from .running import InSteps
 
@@ -92,3 +92,54 @@ class QH_OT_seams(_OnSelectedFaces, properties.SeamOperatorProperties, bpy.types
     def finish(self, result):
         outcomes, cuts = result
         return telling.tell(self, outcomes, cuts) if outcomes else telling.tell_of_seams(self, cuts)
+
+
+class _OnSelectedUVs(_OnSelectedFaces):
+    """Mix-in for an operator that changes the UVs that are selected; the classes say how, and what to select."""
+
+    nothing = ""
+
+    def draw(self, _context):
+        properties.draw_relaxing(self.layout, self)
+
+    def begin(self, context):
+        options = context.scene.qh_unwrap.mesh_options()
+        return self.work(selection.mesh_objects(context), self.settings(), options, context)
+
+    def finish(self, outcomes):
+        if not outcomes:
+            self.report({'ERROR'}, self.nothing)
+            return {'CANCELLED'}
+        return telling.tell(self, outcomes, [])
+
+
+class QH_OT_relax(_OnSelectedUVs, properties.RelaxOperatorProperties, bpy.types.Operator):
+    """Even out the selected UVs where they lie; their border, pins and all that is not selected stay"""
+
+    bl_idname = "uv.qh_relax"
+    bl_label = "Quasi-Harmonic Relax"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    nothing = "No UVs are selected: select some to relax, in the UV Editor or in the 3D View"
+    work = staticmethod(relaxing.relax)
+
+    def invoke(self, context, event):
+        """From a menu: with the panel's settings.  Scripts come to `execute`, with the defaults."""
+        self.take_unset_from(context.scene.qh_relax)
+        return super().invoke(context, event)
+
+
+class QH_OT_straighten(_OnSelectedUVs, properties.StraightenOperatorProperties, bpy.types.Operator):
+    """Make selected edges straight in the UV map, or selected quads a rectangle, and relax the rest around them"""
+
+    bl_idname = "uv.qh_straighten"
+    bl_label = "Quasi-Harmonic Straighten"
+    bl_options = {'REGISTER', 'UNDO'}
+
+    nothing = "Nothing is selected that could become straight: select edges, or quads for a rectangle"
+    work = staticmethod(relaxing.straighten)
+
+    def invoke(self, context, event):
+        """From a menu: with the panel's settings.  Scripts come to `execute`, with the defaults."""
+        self.take_unset_from(context.scene.qh_straighten)
+        return super().invoke(context, event)

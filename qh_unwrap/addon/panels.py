@@ -15,6 +15,13 @@ def draw_menu(menu, _context):
     menu.layout.operator("uv.qh_unwrap", text="Quasi-Harmonic")
 
 
+def draw_relax_menu(menu, _context):
+    menu.layout.separator()
+    menu.layout.operator("uv.qh_relax")
+    menu.layout.operator("uv.qh_straighten", text="Quasi-Harmonic Straighten Edges").shape = 'LINES'
+    menu.layout.operator("uv.qh_straighten", text="Quasi-Harmonic Quads to Rectangle").shape = 'RECTANGLE'
+
+
 def draw_seam_menu(menu, _context):
     menu.layout.separator()
     menu.layout.operator("uv.qh_seams")
@@ -46,6 +53,23 @@ class _SeamPanel:
         for name, value in settings.as_keywords().items():
             setattr(button, name, value)
         properties.draw_seams(layout.column(), settings, context.object)
+
+
+class _RelaxPanel:
+    bl_label = "Relax"
+    bl_region_type = 'UI'
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        for name, text, icon, settings in (
+            ("uv.qh_relax", "Relax", 'MOD_SMOOTH', context.scene.qh_relax),
+            ("uv.qh_straighten", "Straighten", 'MOD_LATTICE', context.scene.qh_straighten),
+        ):
+            column = self.layout.column()
+            button = column.operator(name, text=text, icon=icon)
+            for key, value in settings.as_keywords().items():
+                setattr(button, key, value)
+            properties.draw_relaxing(column.column(), settings)
 
 
 class _ReportPanel:
@@ -121,6 +145,16 @@ class QH_PT_uv_editor_seams(_SeamPanel, bpy.types.Panel):
 
 
 class QH_PT_view_3d_seams(_SeamPanel, bpy.types.Panel):
+    bl_space_type = 'VIEW_3D'
+    bl_parent_id = "QH_PT_view_3d"
+
+
+class QH_PT_uv_editor_relax(_RelaxPanel, bpy.types.Panel):
+    bl_space_type = 'IMAGE_EDITOR'
+    bl_parent_id = "QH_PT_uv_editor"
+
+
+class QH_PT_view_3d_relax(_RelaxPanel, bpy.types.Panel):
     bl_space_type = 'VIEW_3D'
     bl_parent_id = "QH_PT_view_3d"
 

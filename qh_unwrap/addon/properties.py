@@ -6,6 +6,7 @@ import dataclasses
 import bpy
 
 from ..core import Settings
+from ..core.relax_settings import RelaxSettings, StraightenSettings
 from ..core.seam_settings import SeamSettings
 from .options import MeshOptions, SeamOptions
 
@@ -95,6 +96,32 @@ class SeamOperatorProperties(_Cutting, kinds=(SeamOptions, SeamSettings), option
     """The same for an operator, which forgets them after each run."""
 
 
+class _Relaxing(_Properties):
+    def settings(self):
+        return _made_from(self, RelaxSettings)
+
+
+class RelaxProperties(_Relaxing, kinds=(RelaxSettings,)):
+    """How to relax."""
+
+
+class RelaxOperatorProperties(_Relaxing, kinds=(RelaxSettings,), options={'SKIP_SAVE'}):
+    """The same for an operator, which forgets them after each run."""
+
+
+class _Straightening(_Properties):
+    def settings(self):
+        return _made_from(self, StraightenSettings)
+
+
+class StraightenProperties(_Straightening, kinds=(StraightenSettings,)):
+    """How to straighten."""
+
+
+class StraightenOperatorProperties(_Straightening, kinds=(StraightenSettings,), options={'SKIP_SAVE'}):
+    """The same for an operator, which forgets them after each run."""
+
+
 _FIRST = ('boundary', 'aspect', 'balance', 'iterations', 'weights')
 _SECTIONS = {
     "Layout": ('placement', 'rotate', 'margin_method', 'margin'),
@@ -158,9 +185,27 @@ def draw_seams(layout, owner, obj):
         row.prop(owner, name)
 
 
+def draw_relaxing(layout, owner):
+    """A row for each property of relaxing or straightening; what does not apply is greyed out."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    for field in owner.fields:
+        row = layout.row()
+        row.active = field.name != 'along' or owner.shape == 'LINES'
+        row.prop(owner, field.name)
+
+
 class QHUnwrapSceneSettings(SettingsProperties, bpy.types.PropertyGroup):
     """The settings that the panels show and their button uses."""
 
 
 class QHSeamsSceneSettings(SeamProperties, bpy.types.PropertyGroup):
     """The same for seams."""
+
+
+class QHRelaxSceneSettings(RelaxProperties, bpy.types.PropertyGroup):
+    """The same for relaxing."""
+
+
+class QHStraightenSceneSettings(StraightenProperties, bpy.types.PropertyGroup):
+    """The same for straightening."""

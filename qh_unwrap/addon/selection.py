@@ -34,7 +34,7 @@ def distinct_meshes(objects):
 
 def targets(context):
     """The faces that the person selected, of each object that has any."""
-    attached = context.mode == 'EDIT_MESH' and _in_uv_editor(context)
+    attached = context.mode == 'EDIT_MESH' and in_uv_editor(context)
     found = [Target(obj, _selected(obj, context), attached) for obj in mesh_objects(context)]
     return [target for target in found if target.faces.any()]
 
@@ -44,7 +44,7 @@ def nothing_selected(context):
     if context.mode == 'OBJECT':
         return _nothing_visible(mesh_objects(context))
     by_uvs = not context.scene.tool_settings.use_uv_select_sync
-    if _in_uv_editor(context) and by_uvs:
+    if in_uv_editor(context) and by_uvs:
         return "No faces are selected: press A in the UV Editor, or turn on UV Sync Selection"
     return "No faces are selected"
 
@@ -78,14 +78,14 @@ def _selected(obj, context):
     return np.array([rule(face) and not face.hide for face in bm.faces], dtype=bool)
 
 
-def _in_uv_editor(context):
+def in_uv_editor(context):
     return isinstance(context.space_data, bpy.types.SpaceImageEditor)
 
 
 def _uv_rule(bm, context):
     """Whether a face counts as selected, by its UVs; None where it is the mesh's own selection that counts."""
     uv_layer = bm.loops.layers.uv.active
-    if uv_layer is None or not _in_uv_editor(context):
+    if uv_layer is None or not in_uv_editor(context):
         return None
     sync = context.scene.tool_settings.use_uv_select_sync
     if bpy.app.version < (5, 0, 0):

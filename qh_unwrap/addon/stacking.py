@@ -13,17 +13,8 @@ def report_overlaps(works, all_works, options):
     A generator that yields the share that is done, from 0 to 1.  What shares no image does not overlap.
     """
     names = [work.outcome.label for work in works]
-    now = [(work.uv / work.aspect)[work.triangles] for work in works]
-    before = [work.old_triangles for work in works]
-    before = [old if old is None else old / work.aspect for old, work in zip(before, works, strict=True)]
-    images = [work.image for work in works]
-    for obj, rest, image in layout.left_alone(all_works):
-        names.append(f"other faces of {obj.name}")
-        now.append(rest)
-        before.append(rest)
-        images.append(image)
-    numbers = {image: number for number, image in enumerate(dict.fromkeys(images))}
-    found = yield from new_overlaps(now, before, [numbers[image] for image in images])
+    names += [f"other faces of {obj.name}" for obj, _, _ in layout.left_alone(all_works)]
+    found = yield from new_overlaps_of(works, all_works)
     for work, others in zip(works, found, strict=False):
         outcome = work.outcome
         outcome.overlaps = tuple(names[other] for other in others[:_NAMED])
@@ -31,3 +22,18 @@ def report_overlaps(works, all_works, options):
         # Packing moves only what is unwrapped, and does not help again.
         packing_helps = options.placement != 'PACK' and others and others[0] < len(works)
         outcome.overlap_cure = "pack them together" if packing_helps else "move it to a free place"
+
+
+def new_overlaps_of(works, all_works):
+    """For each of the works, and then for what `layout.left_alone` yields, the numbers among these of what it lies on
+    now and did not before.  A generator like `report_overlaps`."""
+    now = [(work.uv / work.aspect)[work.triangles] for work in works]
+    before = [work.old_triangles for work in works]
+    before = [old if old is None else old / work.aspect for old, work in zip(before, works, strict=True)]
+    images = [work.image for work in works]
+    for _, rest, image in layout.left_alone(all_works):
+        now.append(rest)
+        before.append(rest)
+        images.append(image)
+    numbers = {image: number for number, image in enumerate(dict.fromkeys(images))}
+    return (yield from new_overlaps(now, before, [numbers[image] for image in images]))

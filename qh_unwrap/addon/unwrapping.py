@@ -43,13 +43,13 @@ def unwrap_targets(
             _take(cut, work)
         works += its
     yield from mapped(lambda share: _UNWRAPPING * share, _unwrap(works))
-    if _are_as_read(works):
+    if are_as_read(works):
         placed = yield from _placed(works, options, context)
         yield 1.0
-        if placed and _are_as_read(works):
+        if placed and are_as_read(works):
             with modes.in_object_mode(context):
                 for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
-                    _write(obj, list(group), cuts.get(obj))
+                    write(obj, list(group), cuts.get(obj))
     outcomes = [work.outcome for work in works]
     last_run.remember(outcomes, settings, options)
     return outcomes
@@ -58,7 +58,7 @@ def unwrap_targets(
 _UNWRAPPING = 0.9  # of all the work, by and large; the rest is to see what lies on what
 
 
-def _are_as_read(works):
+def are_as_read(works):
     """Whether all meshes are as they were read; if not, no island is unwrapped, and its outcome says why."""
     meshes = {id(work.mesh): work for work in works}.values()  # once each
     if all(mesh_arrays.is_as_read(work.target.obj, work.mesh) for work in meshes):
@@ -131,7 +131,7 @@ def _unwrap(works):
                 if work.cut_fault and work.outcome.needs_cut:
                     work.outcome.error = work.cut_fault
             else:
-                _keep(work, result)
+                keep(work, result)
 
 
 def _shape(work):
@@ -184,7 +184,8 @@ def _explained(error, work):
     return f"{error}{_HANGS}" if work.is_attached and isinstance(error, BoundaryError | UVError) else str(error)
 
 
-def _keep(work, result):
+def keep(work, result):
+    """Take the core's result of an island."""
     report, outcome = result.report, work.outcome
     work.uv, work.loops, work.mirrored = result.uv, result.loops, report.mirrored
     work.certified = report.injective
@@ -212,9 +213,10 @@ def _remarks(island):
         yield f"it ends at {count(island.crowded_edges, 'edge')} where more than two faces meet"
 
 
-def _write(obj, works, cut):
-    corners = np.concatenate([work.island.corners for work in works])
-    uv = np.concatenate([work.corner_uv for work in works])
+def write(obj, works, cut=None):
+    """Write the works' UVs into their object, and mark the new seams of a cut; call it in Object Mode."""
+    corners = np.concatenate([work.island.corners[work.written] for work in works])
+    uv = np.concatenate([work.corner_uv[work.written] for work in works])
     try:
         mesh_arrays.write(obj, corners, uv)
     except UnwrapError as error:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core import Settings, placing
 from ..core.islands import Island
+from ..core.straightening import Straight
 from ..core.triangles import corners_of, signed_areas
 from . import mesh_arrays
 from .outcome import Outcome
@@ -32,6 +33,8 @@ class Work:
     has_new_seams: bool = False  # so that its old place says nothing
     cut_fault: str = ""  # why no seams were found that open it
     found_uv: np.ndarray | None = None  # (n, 2) those that the search for these seams ended with
+    moving: np.ndarray | None = None  # (n,) bool, which vertices may move where not all of them may
+    straight: Straight | None = None  # what is to be straight in it
 
     @cached_property
     def aspect(self):
@@ -49,8 +52,11 @@ class Work:
     @cached_property
     def old_uv(self):
         """(n, 2), None if there is no map or nothing in it; where the map is cut, of one of the corners."""
-        if self.mesh.uv is None or self.uv_fault:
-            return None
+        return None if self.mesh.uv is None or self.uv_fault else self.raw_uv
+
+    @property
+    def raw_uv(self):
+        """The same where there is a map, whatever is in it."""
         return self.mesh.uv[self._source] * self.aspect
 
     @cached_property
@@ -138,8 +144,22 @@ class Work:
 
     @property
     def corner_uv(self):
-        """(c, 2) the new UVs of its corners, the same for all of a vertex."""
-        return self.written_uv[self.island.corner_vertex]
+        """(c, 2) the new UVs of its corners, the same for all of a vertex; but where it is relaxed, a coordinate that
+        stayed stays in every corner."""
+        new = self.written_uv[self.island.corner_vertex]
+        if self.moving is None or not self.in_frame:
+            return new
+        return np.where((self.uv == self.old_uv)[self.island.corner_vertex], self.mesh.uv[self.island.corners], new)
+
+    @property
+    def written(self):
+        """(c,) bool, those of its corners whose UVs are written: of vertices that may move."""
+        if self.moving is None:
+            return np.ones(len(self.island.corners), dtype=bool)
+        moved = self.moving.copy()
+        if self.straight is not None:
+            moved |= self.straight.held.any(axis=1)
+        return moved[self.island.corner_vertex]
 
     @property
     def is_cut(self):

@@ -32,6 +32,8 @@ class Batch:
     pinned: np.ndarray  # (n, 2) bool
     partner: np.ndarray | None  # (n, 2)
     mirror: np.ndarray  # (p, 2), what to multiply UVs with: -1 for U in a mirror
+    start: np.ndarray  # (n, 2), the maps from which pins are led, seen like the UVs, which they are elsewhere
+    has_start: np.ndarray  # (p,) bool
 
     @property
     def has_pins(self) -> np.ndarray:
@@ -74,10 +76,10 @@ class Batch:
         """The chosen pieces, (p,) bool, alone."""
         number, rows = self.surface.numbering(pieces), self.rows(pieces)
         fixed = self.fixed.of(rows, number)
-        by_piece = (each[pieces] for each in (self.index, self.has_uv, self.mirror))
-        index, has_uv, mirror = by_piece
-        surface = self.surface.of(pieces, number)
-        return Batch(surface, index, fixed.values, has_uv, fixed.held, fixed.partner, mirror)
+        by_piece = (each[pieces] for each in (self.index, self.has_uv, self.mirror, self.has_start))
+        index, has_uv, mirror, has_start = by_piece
+        surface, start = self.surface.of(pieces, number), self.start[rows]
+        return Batch(surface, index, fixed.values, has_uv, fixed.held, fixed.partner, mirror, start, has_start)
 
 
 class Batched:
@@ -123,7 +125,7 @@ class Batched:
     def _checked(self, k, shape, settings):
         vertices, triangles = checked_arrays(shape.vertices, shape.triangles)
         n = len(vertices)
-        uv = None if shape.uv is None else checked_uv(n, shape.uv)
+        uv, start = (None if given is None else checked_uv(n, given) for given in (shape.uv, shape.start))
         pinned = checked_pins(n, shape.pinned)
         if uv is None and settings.boundary == "FREE" and pinned is not None and pinned.any():
             raise UVError("pins need UVs, and there are none: unpin")
@@ -137,10 +139,11 @@ class Batched:
         if shape.face is not None and np.shape(shape.face) != (len(triangles),):
             raise ShapeError(f"there must be a face for each of the {len(triangles)} triangles")
         if n <= locality.MANY:
-            return Shape(vertices, triangles, uv, pinned, partner)
+            return Shape(vertices, triangles, uv, pinned, partner, start=start)
         mesh = self._sorted[k] = locality.Sorted(vertices, triangles)
         partner = None if partner is None else mesh.renumbered(partner)
-        return Shape(mesh.vertices, mesh.triangles, mesh.sorted(uv), mesh.sorted(pinned), partner)
+        uv, pinned, start = (mesh.sorted(values) for values in (uv, pinned, start))
+        return Shape(mesh.vertices, mesh.triangles, uv, pinned, partner, start=start)
 
     def _joined(self, shapes, settings):
         while shapes:
@@ -165,25 +168,31 @@ class Batched:
 def _batch(shapes, surface, settings):
     n = len(surface.vertices)
     uv, pinned, partner = np.zeros((n, 2)), np.zeros((n, 2), bool), None
-    has_uv = np.array([shape.uv is not None for shape in shapes.values()])
+    start = np.zeros((n, 2))
+    has_uv, has_start = (
+        np.array([getattr(shape, name) is not None for shape in shapes.values()]) for name in ("uv", "start")
+    )
     ends = np.append(surface.vertex_starts, n)
     for k, shape in enumerate(shapes.values()):
         its = slice(ends[k], ends[k + 1])
         if shape.uv is not None:
             uv[its] = shape.uv
+        start[its] = uv[its] if shape.start is None else shape.start
         if shape.pinned is not None:
             pinned[its] = shape.pinned
         if shape.partner is not None:
             if partner is None:
                 partner = np.column_stack([np.arange(n), np.arange(n)])
             partner[its] = shape.partner + ends[k]
-    batch = Batch(surface, np.array(list(shapes)), uv, has_uv, pinned, partner, np.ones((len(shapes), 2)))
+    mirror = np.ones((len(shapes), 2))
+    batch = Batch(surface, np.array(list(shapes)), uv, has_uv, pinned, partner, mirror, start, has_start)
     # Where the old UVs hold the new ones and are mirrored, unwrap as seen in a mirror.
     for k in np.flatnonzero(batch.in_frame(settings)):
-        its = uv[batch.rows_of(k)]
+        its = start[batch.rows_of(k)]
         if enclosed_area(its[outer_loop(surface.one(k), its)]) < 0:
             batch.mirror[k, 0] = -1
-    batch.uv *= batch.mirror[surface.vertex_piece]
+    for each in (batch.uv, batch.start):
+        each *= mirror[surface.vertex_piece]
     return batch
 
 

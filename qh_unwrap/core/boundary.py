@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from .certificate import count_crossings, enclosed_area
 from .chart import Surface, edge_lengths
-from .errors import BoundaryError, PinError, UnwrapError, UVError
+from .errors import BorderError, BoundaryError, PinError, UnwrapError, UVError
 from .initial import project
 from .settings import Settings
 
@@ -228,18 +228,16 @@ def _on_polygon(surface, polygon, side, along):
 
 
 def _kept(surface, uv, pinned):
-    """The vertices of all boundary loops, and those that are pinned, (n,) bool; raises `BoundaryError`."""
+    """The vertices of all boundary loops, and those that are pinned, (n,) bool; raises `BorderError`."""
     held = np.zeros(len(surface.vertices), bool)
     for loop in surface.loops:
         held[loop] = True
     if not enclosed_area(uv[outer_loop(surface, uv)]) > 0:
-        raise BoundaryError("the UVs' outline encloses no area: choose another boundary")
+        raise BorderError("the UVs' outline encloses no area", "choose another boundary")
     crossings = count_crossings([uv[loop] for loop in surface.loops])
     if crossings:
-        raise BoundaryError(
-            f"the UVs' outline crosses itself {'once' if crossings == 1 else f'{crossings} times'}:"
-            " untangle it, or choose another boundary"
-        )
+        times = "once" if crossings == 1 else f"{crossings} times"
+        raise BorderError(f"the UVs' outline crosses itself {times}", "untangle it, or choose another boundary")
     return held if pinned is None else held | pinned
 
 

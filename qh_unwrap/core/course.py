@@ -156,10 +156,11 @@ class Course(Improvement):
         """With outlines that are free."""
         batch, settings = self.batch, self.settings
         surface, p = batch.surface, batch.surface.piece_count
-        start, certified, to_lead = batch.uv, None, np.zeros(p, bool)
+        start, certified, to_lead = batch.start, None, np.zeros(p, bool)
         if settings.initial == "AUTO":
             good = batch.has_pins & ~wrong_pieces([surface], start)
             start, to_lead = self._before_pins(batch.has_pins & ~good)
+            to_lead |= good & batch.has_start
             new = ~(good | to_lead)
             if new.any():
                 start = start.copy()
@@ -290,7 +291,7 @@ class Course(Improvement):
         """The given maps, of the chosen pieces as they may have been before pins were moved; and in which pieces, (p,)
         bool, that is a map without flips from which these can be led."""
         batch = self.batch
-        start, found = batch.uv.copy(), np.zeros(len(pieces), bool)
+        start, found = batch.start.copy(), np.zeros(len(pieces), bool)
         for k in np.flatnonzero(pieces):  # each by itself, since equations may have no solution
             its, one = batch.rows_of(int(k)), batch.surface.one(int(k))
             try:

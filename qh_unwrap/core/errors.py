@@ -36,6 +36,14 @@ class BoundaryError(UnwrapError):
     """The outline cannot go where the settings want it, or a triangulator of the caller's returned no triangulation."""
 
 
+class BorderError(BoundaryError):
+    """The outline is to stay, and cannot be that of any map; `fault` says why."""
+
+    def __init__(self, fault: str, cure: str):
+        super().__init__(f"{fault}: {cure}")
+        self.fault = fault
+
+
 class SurfaceError(UnwrapError):
     """The triangles do not make a surface that can be unwrapped.
 

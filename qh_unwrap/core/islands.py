@@ -65,13 +65,13 @@ def find_islands(
     is_double = doubles.among(len(face_start))
     single, doubled = selected & ~is_double, selected & is_double
     own_corners = np.flatnonzero(single[corner_face])
-    one, start, end, opposed = _across_edges(corner_vertex, corner_edge, following, seam, own_corners)
+    one, start, end, opposed = across_edges(corner_vertex, corner_edge, following, seam, own_corners)
     here, there = corner_face[one], corner_face[start]
     face_island = components(len(face_start), here, there)[1]
     turned, cut = agreed(here, there, opposed, face_island)
     if cut.any():
         one, start, end = (each[~cut] for each in (one, start, end))
-    uv_vertex = _uv_vertices(one, start, end, following)
+    uv_vertex = uv_vertices(one, start, end, following)
     triangles = _without_doubled_diagonals(corner_triangles, following, uv_vertex)
 
     uv_vertex[doubles.corners] = uv_vertex[doubles.twins]
@@ -159,7 +159,7 @@ def cuts(
     seam, everything = np.zeros(edge_count, dtype=bool), np.ones(len(face_start), dtype=bool)
     following, (one, start, end) = _neighbours(corner_vertex, corner_edge, face_start, seam, everything)
     cut = np.zeros(edge_count, dtype=bool)
-    cut[corner_edge[one[~_meet(uv, one, start, end, following)]]] = True
+    cut[corner_edge[one[~meeting(uv, one, start, end, following)]]] = True
     return cut
 
 
@@ -176,23 +176,23 @@ def attached(
     A doubled face that is not selected holds nothing, nor does it count as one that hangs there.
     """
     following, (one, start, end) = _neighbours(corner_vertex, corner_edge, face_start, seam, selected)
-    joined = _meet(uv, one, start, end, following)
-    uv_vertex = _uv_vertices(one[joined], start[joined], end[joined], following)
+    joined = meeting(uv, one, start, end, following)
+    uv_vertex = uv_vertices(one[joined], start[joined], end[joined], following)
     is_selected = selected[around_faces(face_start, len(corner_vertex))[0]]
     unselected_there = np.bincount(uv_vertex, weights=~is_selected) > 0
     return is_selected & unselected_there[uv_vertex]
 
 
 def _neighbours(corner_vertex, corner_edge, face_start, seam, selected):
-    """The corner that follows each around its face, and what `_across_edges` returns of all faces but doubled ones."""
+    """The corner that follows each around its face, and what `across_edges` returns of all faces but doubled ones."""
     corner_face, following = around_faces(face_start, len(corner_vertex))
     doubles = find_doubles(corner_vertex, corner_edge, face_start, seam, selected)
     corners = np.flatnonzero(~doubles.among(len(face_start))[corner_face])
-    return following, _across_edges(corner_vertex, corner_edge, following, seam, corners)[:3]
+    return following, across_edges(corner_vertex, corner_edge, following, seam, corners)[:3]
 
 
-def _meet(uv, one, start, end, following):
-    """Whether the UVs of two faces are the same along each of the edges that `_across_edges` returns, (k,) bool.
+def meeting(uv: np.ndarray, one: np.ndarray, start: np.ndarray, end: np.ndarray, following: np.ndarray) -> np.ndarray:
+    """Whether the UVs of two faces are the same along each of the edges that `across_edges` returns, (k,) bool.
 
     They may differ by some rounding, and by a small part of the edge's length.
     """
@@ -207,7 +207,9 @@ def _meet(uv, one, start, end, following):
     return meet
 
 
-def _across_edges(corner_vertex, corner_edge, following, seam, corners):
+def across_edges(
+    corner_vertex: np.ndarray, corner_edge: np.ndarray, following: np.ndarray, seam: np.ndarray, corners: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Three corners for every edge that joins two faces, (k,) each: that of one face that starts the edge, and those of
     the other face at the edge's start and end; and whether both run along it the same way, so that one of the faces is
     inside out, (k,) bool."""
@@ -218,8 +220,8 @@ def _across_edges(corner_vertex, corner_edge, following, seam, corners):
     return one, np.where(opposed, other, following[other]), np.where(opposed, following[other], other), opposed
 
 
-def _uv_vertices(one, start, end, following):
-    """The UV vertex of each corner, (c,), where faces hang together across the edges that `_across_edges` returns."""
+def uv_vertices(one: np.ndarray, start: np.ndarray, end: np.ndarray, following: np.ndarray) -> np.ndarray:
+    """The UV vertex of each corner, (c,), where faces hang together across the edges that `across_edges` returns."""
     return components(len(following), np.concatenate([one, following[one]]), np.concatenate([start, end]))[1]
 
 

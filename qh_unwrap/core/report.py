@@ -22,6 +22,8 @@ class Shape:
                (RECTANGLE)
     partner    (n, 2) int, for U and V of every vertex the vertex that it keeps its distance from, itself for nobody
                (boundary FREE or KEEP, with `uv`)
+    start      (n, 2), the map to begin with, if it is another one than `uv`: pins are led from it to where `uv` has
+               them (boundary FREE, start AUTO); one with flips is not taken
     face       (m,) int, the polygon that each triangle is a part of, where warnings are to speak of polygons
     """
 
@@ -31,6 +33,7 @@ class Shape:
     pinned: np.ndarray | None = None
     partner: np.ndarray | None = None
     face: np.ndarray | None = None
+    start: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,6 +97,7 @@ class Unwrapper:
         course.sure[k] = False
         batch.pinned[its] = pins
         batch.uv[its] = np.where(pins, uv * batch.mirror[k], course.best[its])
+        batch.start[its], batch.has_start[k] = batch.uv[its], False
         self._go_on()
 
     def _go_on(self):

@@ -74,6 +74,12 @@ _WEIGHTS = (
 )
 
 
+def setting_of(owner: type, name: str) -> Any:
+    """A field like that with this name in another dataclass of settings, to stand in one more of them."""
+    field = next(field for field in dataclasses.fields(owner) if field.name == name)
+    return dataclasses.field(default=field.default, metadata=dict(field.metadata))
+
+
 @dataclass(frozen=True)
 class Settings:
     """How to unwrap.  Values are checked when the object is made; raises `SettingsError`."""

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts of UV maps that move while all around them stays: what is selected, as the UVs themselves hang together.
+
+Corners are as in `islands`.  Here faces hang together where their UVs do, whatever the seams say.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .doubles import find_doubles
+from .islands import Island, across_edges, find_islands, meeting, uv_vertices
+from .pieces import around_faces, components
+
+
+class Selection(NamedTuple):
+    """What is selected in a UV map."""
+
+    faces: np.ndarray  # (f,) bool
+    corners: np.ndarray  # (c,) bool, UVs: those of selected faces, and single ones
+
+
+class Connected:
+    """How the faces of a mesh hang together in its UV map.
+
+    Faces on top of others with the same corners and the same UVs go along with these; those with other UVs stay.
+
+    Parameters
+    ----------
+    corner_vertex, corner_edge, face_start, edge_count : as in `islands`
+    uv : (c, 2)
+    selection : what is selected; of faces on top of each other, a selected one is looked at
+
+    Attributes
+    ----------
+    uv_vertex : (c,), the UV vertex of each corner
+    joined : (e,) bool, the edges across which faces hang together
+    outline : (v,) bool, the UV vertices at which the map ends
+    set_aside : (f,) bool, the faces on top of others, with other UVs
+    """
+
+    def __init__(
+        self,
+        corner_vertex: np.ndarray,
+        corner_edge: np.ndarray,
+        face_start: np.ndarray,
+        edge_count: int,
+        uv: np.ndarray,
+        selection: Selection,
+    ):
+        self._mesh, self._uv, self._selection = (corner_vertex, corner_edge, face_start), uv, selection
+        nowhere = np.zeros(edge_count, bool)
+        self.corner_face, following = around_faces(face_start, len(corner_vertex))
+        doubles = self._doubles = find_doubles(corner_vertex, corner_edge, face_start, nowhere, selection.faces)
+        apart = (uv[doubles.corners] != uv[doubles.twins]).any(axis=1)
+        self.set_aside = np.zeros(len(face_start), bool)
+        self.set_aside[self.corner_face[doubles.corners[apart]]] = True
+        self._single = single = ~doubles.among(len(face_start))[self.corner_face]
+        one, start, end, _ = across_edges(corner_vertex, corner_edge, following, nowhere, np.flatnonzero(single))
+        meet = meeting(uv, one, start, end, following)
+        one, start, end = one[meet], start[meet], end[meet]
+        self.joined = nowhere.copy()
+        self.joined[corner_edge[one]] = True
+        self.uv_vertex = uv_vertices(one, start, end, following)
+        self.outline = np.zeros(self.uv_vertex.max(initial=-1) + 1, bool)
+        ends = single & ~self.joined[corner_edge]
+        self.outline[self.uv_vertex[ends]] = self.outline[self.uv_vertex[following[ends]]] = True
+
+    def moving(self, outline_moves: bool) -> np.ndarray:
+        """The corners whose UVs may move, (c,) bool.
+
+        A UV vertex does if it is selected in all faces around it, and does not lie on the border between selected and
+        unselected faces, nor, unless the `outline_moves`, on the outline of its island.
+        """
+        in_selected = self._selection.faces[self.corner_face]
+        still = self._at_vertices(~self._selection.corners)
+        still |= self._at_vertices(in_selected) & self._at_vertices(~in_selected)
+        still |= self._pinched if outline_moves else self.outline
+        return ~still[self.uv_vertex] & self._single
+
+    def spread(self, corners: np.ndarray) -> np.ndarray:
+        """The chosen corners (c,) bool, and all that share a UV vertex with one of them."""
+        return self._at_vertices(corners)[self.uv_vertex]
+
+    def _at_vertices(self, corners):
+        """Which UV vertices have any of the corners (c,) bool, (v,) bool; those of doubled faces do not count."""
+        found = np.zeros(len(self.outline), bool)
+        found[self.uv_vertex[corners & self._single]] = True
+        return found
+
+    @property
+    def _pinched(self):
+        """The UV vertices, (v,) bool, where several fans of faces meet in one place: moved, they would part."""
+        corners = np.flatnonzero(self._single & self.outline[self.uv_vertex])
+        _, first = np.unique(self.uv_vertex[corners], return_index=True)
+        fans = corners[first]
+        places = np.column_stack([self._mesh[0][fans], self._uv[fans]])
+        _, place, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+        pinched = np.zeros(len(self.outline), bool)
+        pinched[self.uv_vertex[fans[count[place.ravel()] > 1]]] = True
+        return pinched
+
+    def faces_with(self, corners: np.ndarray) -> np.ndarray:
+        """The faces, (f,) bool, that have any of the chosen corners (c,) bool."""
+        faces = np.zeros(len(self._mesh[2]), bool)
+        faces[self.corner_face[corners]] = True
+        return faces
+
+    def whole_islands(self, faces: np.ndarray) -> np.ndarray:
+        """The faces, (f,) bool, of all UV islands that have any of the chosen faces (f,) bool."""
+        corners = np.flatnonzero(self._single)
+        vertex, face = self.uv_vertex[corners], self.corner_face[corners]
+        part = components(len(self.outline) + len(faces), vertex, len(self.outline) + face)[1][len(self.outline) :]
+        return np.isin(part, part[faces & self.faces_with(self._single)]) & self.faces_with(self._single)
+
+    def islands(self, faces: np.ndarray, corner_triangles: np.ndarray) -> list[Island]:
+        """The islands that the chosen faces (f,) bool make, with those on top of them that go along."""
+        faces, doubles = faces.copy(), self._doubles
+        faces[doubles.faces] = faces[doubles.twin_faces]
+        return find_islands(*self._mesh, ~self.joined, faces & ~self.set_aside, corner_triangles)
