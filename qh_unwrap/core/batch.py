@@ -34,6 +34,7 @@ class Batch:
     mirror: np.ndarray  # (p, 2), what to multiply UVs with: -1 for U in a mirror
     start: np.ndarray  # (n, 2), the maps from which pins are led, seen like the UVs, which they are elsewhere
     has_start: np.ndarray  # (p,) bool
+    crossing: np.ndarray  # (p,) bool, whether outlines that cross themselves are kept
 
     @property
     def has_pins(self) -> np.ndarray:
@@ -76,10 +77,20 @@ class Batch:
         """The chosen pieces, (p,) bool, alone."""
         number, rows = self.surface.numbering(pieces), self.rows(pieces)
         fixed = self.fixed.of(rows, number)
-        by_piece = (each[pieces] for each in (self.index, self.has_uv, self.mirror, self.has_start))
-        index, has_uv, mirror, has_start = by_piece
-        surface, start = self.surface.of(pieces, number), self.start[rows]
-        return Batch(surface, index, fixed.values, has_uv, fixed.held, fixed.partner, mirror, start, has_start)
+        by_piece = (each[pieces] for each in (self.index, self.has_uv, self.mirror, self.has_start, self.crossing))
+        index, has_uv, mirror, has_start, crossing = by_piece
+        return Batch(
+            surface=self.surface.of(pieces, number),
+            index=index,
+            uv=fixed.values,
+            has_uv=has_uv,
+            pinned=fixed.held,
+            partner=fixed.partner,
+            mirror=mirror,
+            start=self.start[rows],
+            has_start=has_start,
+            crossing=crossing,
+        )
 
 
 class Batched:
@@ -139,11 +150,11 @@ class Batched:
         if shape.face is not None and np.shape(shape.face) != (len(triangles),):
             raise ShapeError(f"there must be a face for each of the {len(triangles)} triangles")
         if n <= locality.MANY:
-            return Shape(vertices, triangles, uv, pinned, partner, start=start)
+            return Shape(vertices, triangles, uv, pinned, partner, start=start, crossing=shape.crossing)
         mesh = self._sorted[k] = locality.Sorted(vertices, triangles)
         partner = None if partner is None else mesh.renumbered(partner)
         uv, pinned, start = (mesh.sorted(values) for values in (uv, pinned, start))
-        return Shape(mesh.vertices, mesh.triangles, uv, pinned, partner, start=start)
+        return Shape(mesh.vertices, mesh.triangles, uv, pinned, partner, start=start, crossing=shape.crossing)
 
     def _joined(self, shapes, settings):
         while shapes:
@@ -185,7 +196,9 @@ def _batch(shapes, surface, settings):
                 partner = np.column_stack([np.arange(n), np.arange(n)])
             partner[its] = shape.partner + ends[k]
     mirror = np.ones((len(shapes), 2))
-    batch = Batch(surface, np.array(list(shapes)), uv, has_uv, pinned, partner, mirror, start, has_start)
+    crossing = np.array([shape.crossing for shape in shapes.values()])
+    index = np.array(list(shapes))
+    batch = Batch(surface, index, uv, has_uv, pinned, partner, mirror, start, has_start, crossing)
     # Where the old UVs hold the new ones and are mirrored, unwrap as seen in a mirror.
     for k in np.flatnonzero(batch.in_frame(settings)):
         its = start[batch.rows_of(k)]

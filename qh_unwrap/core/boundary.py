@@ -18,14 +18,20 @@ _AROUND = 0.015  # distance along the outline, relative to its length, within wh
 
 
 def held_outlines(
-    surface: Surface, settings: Settings, uv: np.ndarray, has_uv: np.ndarray, pinned: np.ndarray
+    surface: Surface,
+    settings: Settings,
+    uv: np.ndarray,
+    has_uv: np.ndarray,
+    pinned: np.ndarray,
+    crossing: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, ...]], dict[int, UnwrapError]]:
     """What is held of every piece of a surface, for U and V, (n, 2) bool, and where, (n, 2), as `held_vertices` says.
 
     Also returns for each piece a tuple of warnings, and a dictionary from pieces to their errors.
 
-    uv      (n, 2), of the pieces that have some, (p,) bool in `has_uv`
-    pinned  (n, 2) bool, for U and V
+    uv        (n, 2), of the pieces that have some, (p,) bool in `has_uv`
+    pinned    (n, 2) bool, for U and V
+    crossing  (p,) bool, the pieces whose outlines are kept though they cross themselves
     """
     held, values = np.zeros(len(uv), bool), np.zeros((len(uv), 2))
     warnings: list[tuple[str, ...]] = [()] * surface.piece_count
@@ -37,7 +43,11 @@ def held_outlines(
         pins = None if settings.boundary == "KEEP" else some[its]
         try:
             held[its], values[its], warnings[k] = held_vertices(
-                surface.one(k), settings, uv[its] if has_uv[k] else None, pins
+                surface.one(k),
+                settings,
+                uv[its] if has_uv[k] else None,
+                pins,
+                crossing is not None and bool(crossing[k]),
             )
         except UnwrapError as error:
             faults[k] = error
@@ -46,11 +56,16 @@ def held_outlines(
 
 
 def held_vertices(
-    surface: Surface, settings: Settings, uv: np.ndarray | None = None, pinned: np.ndarray | None = None
+    surface: Surface,
+    settings: Settings,
+    uv: np.ndarray | None = None,
+    pinned: np.ndarray | None = None,
+    crossing: bool = False,
 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """The vertices of a surface of one piece whose place is given, (n,) bool, where it is, (n, 2), and warnings.
 
-    `uv` (n, 2) are the UVs that it has, `pinned` (n,) bool its pinned vertices.
+    `uv` (n, 2) are the UVs that it has, `pinned` (n,) bool its pinned vertices; an outline that is kept may cross itself
+    if `crossing`.
     Raises `UVError`, `PinError` or `BoundaryError` where the settings cannot be followed.
     """
     warnings: tuple[str, ...] = ()
@@ -60,7 +75,7 @@ def held_vertices(
     if settings.boundary == "KEEP":
         if uv is None:
             raise UVError("a kept boundary needs UVs, and there are none: choose another boundary")
-        return _kept(surface, uv, pinned), uv, warnings
+        return _kept(surface, uv, pinned, crossing), uv, warnings
     if not edge_lengths(surface.vertices[loop]).any():
         raise BoundaryError("its outline has no length: merge its vertices by distance, or mark seams elsewhere")
     if settings.boundary == "CIRCLE":
@@ -227,18 +242,24 @@ def _on_polygon(surface, polygon, side, along):
     return start[side] + along[:, None] * direction + bulge[:, None] * outward, int(bowed.sum())
 
 
-def _kept(surface, uv, pinned):
+def _kept(surface, uv, pinned, crossing):
     """The vertices of all boundary loops, and those that are pinned, (n,) bool; raises `BorderError`."""
     held = np.zeros(len(surface.vertices), bool)
     for loop in surface.loops:
         held[loop] = True
     if not enclosed_area(uv[outer_loop(surface, uv)]) > 0:
         raise BorderError("the UVs' outline encloses no area", "choose another boundary")
-    crossings = count_crossings([uv[loop] for loop in surface.loops])
-    if crossings:
-        times = "once" if crossings == 1 else f"{crossings} times"
-        raise BorderError(f"the UVs' outline crosses itself {times}", "untangle it, or choose another boundary")
+    fault = "" if crossing else crossing_fault(surface, uv)
+    if fault:
+        raise BorderError(fault, "untangle it, or choose another boundary")
     return held if pinned is None else held | pinned
+
+
+def crossing_fault(surface: Surface, uv: np.ndarray) -> str:
+    """What there is to say of boundary loops that cross themselves or each other, an empty text if they do not."""
+    crossings = count_crossings([uv[loop] for loop in surface.loops])
+    times = "once" if crossings == 1 else f"{crossings} times"
+    return f"the UVs' outline crosses itself {times}" if crossings else ""
 
 
 def outer_loop(surface: Surface, uv: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .air import Triangulator
+from .boundary import crossing_fault
 from .certificate import certified_pieces, orientation
 from .chart import Surface, numbered_edges
 from .distortion import measure
@@ -110,7 +111,7 @@ def _task(shape, settings):
         initial="CURRENT" if is_free and not flips else "AUTO",
     )
     if held.any():
-        return _Task(made, dataclasses.replace(shape, uv=uv, pinned=held))
+        return _Task(made, dataclasses.replace(shape, uv=uv, pinned=held, crossing=True))
     mirrored = is_mirrored(corners_of(uv, triangles))
     seen = None if flips else uv * (-1, 1) if mirrored else uv
     return _Task(made, dataclasses.replace(shape, uv=seen, pinned=None), mirrored, is_loose=True)
@@ -155,7 +156,11 @@ _CURE = "select all of its island, and let its outline move"
 
 def _settled(shape, task, result, settings):
     """The result where the island was, no worse than before, and as far on as the settings want; or an error."""
+    surface = Surface(shape.vertices, shape.triangles)
     if _has_flips(result):
+        fault = crossing_fault(surface, np.asarray(shape.uv))
+        if fault and task.settings.boundary == "KEEP":
+            return UVError(f"{fault}: {_CURE}")
         cure = "unpin some" if task.settings.boundary == "FREE" else "let its outline move"
         return UVError(f"{CANNOT} with what is held: {cure}")
     old, uv = np.asarray(shape.uv, dtype=float), result.uv
@@ -163,7 +168,6 @@ def _settled(shape, task, result, settings):
     if task.is_loose:
         uv = uv * (-1, 1) if task.mirrored else uv
         uv = in_place(uv, shape.triangles, corners) if says_where(corners) else uv
-    surface = Surface(shape.vertices, shape.triangles)
     was_valid = _is_valid(surface, old)
     if was_valid and not _gains(surface, old, uv, settings.balance):
         uv = old

@@ -24,6 +24,7 @@ class Shape:
                (boundary FREE or KEEP, with `uv`)
     start      (n, 2), the map to begin with, if it is another one than `uv`: pins are led from it to where `uv` has
                them (boundary FREE, start AUTO); one with flips is not taken
+    crossing   whether an outline that crosses itself is kept all the same (boundary KEEP), so that the map overlaps itself
     face       (m,) int, the polygon that each triangle is a part of, where warnings are to speak of polygons
     """
 
@@ -34,6 +35,7 @@ class Shape:
     partner: np.ndarray | None = None
     face: np.ndarray | None = None
     start: np.ndarray | None = None
+    crossing: bool = False
 
 
 @dataclass(frozen=True, eq=False)
