@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core import Settings, Shape, UnwrapError
 from ..core.regions import Connected, Selection
-from ..core.relaxing import relax_islands, straighten_islands
+from ..core.relaxing import relax_islands, rim, straighten_islands
 from ..core.stepping import mapped
 from ..core.straightening import Polygons, rectangle, straight_lines
 from . import judging, mesh_arrays, modes, stacking, uv_selection
@@ -19,6 +19,7 @@ from .unwrapping import are_as_read, keep, write
 from .work import Work
 
 _RELAXING = 0.9  # of all the work, by and large; the rest is to see what lies on what
+_REACH = 2.0  # of an island's size, within which the outlines of others are looked at
 NO_MAP = "it has no UV map: unwrap it first"
 NO_ROOM = "nothing that is selected can move: select more, unpin some, or let outlines move"
 STAYS = "its outline stays as it is: it would run over other islands"
@@ -119,6 +120,7 @@ def _works(obj, mesh, connected, faces, moving):
     for number, island in enumerate(islands, start=1):
         outcome = Outcome(obj.name, number, island.faces, alone=len(islands) == 1)
         work = Work(target, mesh, island, outcome, Settings(boundary='KEEP'), np.zeros(len(moving), dtype=bool))
+        work.connected = connected
         work.moving = np.zeros(len(island.vertices), dtype=bool)
         work.moving[island.corner_vertex[moving[island.corners]]] = True
         yield work
@@ -154,7 +156,8 @@ def _carried_out(works, improved, settings, options, context):
 def _relaxed(works, settings):
     """Relax the works; those that run over others keep their outlines.  Yields the share that is done."""
     tried = [work for work in works if not work.outcome.error and _can_be_read(work, settings)]
-    yield from _taken(tried, relax_islands([_shape(work) for work in tried], settings))
+    outlines = _Outlines(works) if settings.move_outline else None
+    yield from _taken(tried, relax_islands([_shape(work, outlines) for work in tried], settings))
     if not settings.move_outline:
         return
     bold = yield from _running_over(tried, works)
@@ -176,8 +179,41 @@ def _can_be_read(work, settings):
     return True
 
 
-def _shape(work):
-    return Shape(work.vertices, work.triangles, work.raw_uv, ~work.moving, face=work.triangle_faces)
+def _shape(work, outlines=None):
+    walls = None if outlines is None else outlines.beside(work)
+    return Shape(work.vertices, work.triangles, work.raw_uv, ~work.moving, face=work.triangle_faces, walls=walls)
+
+
+class _Outlines:
+    """The outlines of all islands that works may come near to, as segments in their UV maps."""
+
+    def __init__(self, works):
+        self._by_image = {}
+        for mesh, connected in {id(work.mesh): (work.mesh, work.connected) for work in works}.values():
+            if connected is None:
+                continue
+            sides = connected.outline_sides()
+            sides = sides[np.isfinite(mesh.uv[sides]).all(axis=(1, 2))]
+            for image, shown in mesh.faces_by_image():
+                its = sides[shown[mesh.corner_faces[sides[:, 0]]]]
+                self._by_image.setdefault(image, []).append((mesh, its[:, 0], mesh.uv[its]))
+
+    def beside(self, work):
+        """The segments (w, 2, 2) near a work that are not its own; None if there are none, or its outline stays."""
+        if work.uv_fault or not work.moving[rim(work.triangles, len(work.moving))].any():
+            return None
+        low, high = work.old_uv.min(axis=0) / work.aspect, work.old_uv.max(axis=0) / work.aspect
+        reach = _REACH * (high - low).max()
+        own = np.zeros(len(work.mesh.corner_vertex), dtype=bool)
+        own[work.island.corners] = True
+        walls = [np.empty((0, 2, 2))]
+        for mesh, corners, ends in self._by_image.get(work.image, ()):
+            near = (ends.max(axis=1) >= low - reach).all(axis=1) & (ends.min(axis=1) <= high + reach).all(axis=1)
+            if mesh is work.mesh:
+                near &= ~own[corners]
+            walls.append(ends[near])
+        walls = np.concatenate(walls)
+        return walls * work.aspect if len(walls) else None
 
 
 def _running_over(works, all_works):
@@ -190,14 +226,13 @@ def _running_over(works, all_works):
 def _straightened(works, settings):
     """Straighten the works; yields the share that is done."""
     tried = [work for work in works if not work.outcome.error]
-    shapes = []
+    shapes, outlines = [], _Outlines(works) if settings.move_outline else None
     for work in tried:
         straight = work.straight
         pinned = straight.held | ~work.moving[:, None]
         work.in_frame = True
-        shapes.append(
-            Shape(work.vertices, work.triangles, straight.values, pinned, face=work.triangle_faces, start=work.old_uv)
-        )
+        shape = _shape(work, outlines)
+        shapes.append(dataclasses.replace(shape, uv=straight.values, pinned=pinned, start=work.old_uv))
     yield from _taken(tried, straighten_islands(shapes, settings))
     over = yield from _running_over(tried, works)
     for work in over:

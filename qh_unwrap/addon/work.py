@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core import Settings, placing
 from ..core.islands import Island
+from ..core.regions import Connected
 from ..core.straightening import Straight
 from ..core.triangles import corners_of, signed_areas
 from . import mesh_arrays
@@ -35,6 +36,7 @@ class Work:
     found_uv: np.ndarray | None = None  # (n, 2) those that the search for these seams ended with
     moving: np.ndarray | None = None  # (n,) bool, which vertices may move where not all of them may
     straight: Straight | None = None  # what is to be straight in it
+    connected: Connected | None = None  # how its mesh hangs together in the UV map
 
     @cached_property
     def aspect(self):

@@ -18,6 +18,9 @@ way, of a constrained Delaunay triangulation of exactly these points, or None wh
 
 _RADIUS = 2.5  # of the circle that ends the air, relative to that of the island
 _CIRCLE = 48  # vertices on the circle
+_WALLED = 0.95  # of the circle's radius, within which walls are kept out of
+_PIECES = 8  # pieces of the circle's radius, of which none of a wall is longer
+_SAMPLES = 5  # points of a wall that the air around keeps its distance from
 _COARSEST = 4  # edges of the coarsest air that reach from the middle to the circle
 _FINEST = 64  # edges of the finest air that reach across the island's radius
 
@@ -26,14 +29,17 @@ class Air(NamedTuple):
     """Air around one island of n vertices."""
 
     points: np.ndarray  # (a, 2), its own vertices, numbered after the island's
-    on_circle: np.ndarray  # (a,) bool, those on the circle that ends it
+    on_circle: np.ndarray  # (a,) bool, those on the circle that ends it, and on walls: they stay
     triangles: np.ndarray  # (t, 3), all positive
 
 
-def make_air(uv: np.ndarray, loops: Sequence[np.ndarray], triangulate: Triangulator) -> Air | None:
+def make_air(
+    uv: np.ndarray, loops: Sequence[np.ndarray], triangulate: Triangulator, walls: np.ndarray | None = None
+) -> Air | None:
     """Triangulate the plane outside the island's boundary `loops`, and within its holes, as far as a circle.
 
-    `uv` (n, 2) is the island's map.  Returns None where the loops cross or are inside out, or `triangulate` fails.
+    `uv` (n, 2) is the island's map.  `walls` (w, 2, 2) are segments that the island shall not cross, as `clear_walls`
+    returns them.  Returns None where the loops cross or are inside out, or `triangulate` fails.
     """
     outline = np.concatenate(loops)
     start = uv[outline]
@@ -45,13 +51,14 @@ def make_air(uv: np.ndarray, loops: Sequence[np.ndarray], triangulate: Triangula
         return None
     angle = 2 * np.pi * np.arange(_CIRCLE) / _CIRCLE
     circle = centre + _RADIUS * radius * np.column_stack([np.cos(angle), np.sin(angle)])
-    between = _graded_points(start, end, centre, radius)
+    built, wall_sides = _walls(start, walls, centre, radius)
+    between = _graded_points(start, end, centre, radius, np.vstack([start, built])[wall_sides])
 
     place = np.empty(len(uv), dtype=np.int64)
     place[outline] = np.arange(len(outline))
     sides = np.column_stack([place[outline], place[following]])
-    points = np.vstack([start, between, circle])
-    triangles = triangulate(points, sides)
+    points = np.vstack([start, built, between, circle])
+    triangles = triangulate(points, np.vstack([sides, wall_sides]))
     if triangles is None:
         return None
     triangles = np.asarray(triangles)
@@ -64,16 +71,54 @@ def make_air(uv: np.ndarray, loops: Sequence[np.ndarray], triangulate: Triangula
     triangles = _outside(triangles, sides, len(points))
     if triangles is None or len(np.unique(triangles)) < len(points):
         return None
-    added = len(between) + _CIRCLE
+    added = len(built) + len(between) + _CIRCLE
     number = np.concatenate([outline, len(uv) + np.arange(added)])
     points, triangles = points[len(outline) :], number[triangles]
     # Where the outline is all but straight, triangles may be inside out by rounding: they decide nothing.
     solid = orientation(np.vstack([uv, points]), triangles) > 0
-    return Air(points, np.arange(added) >= len(between), triangles[solid])
+    number = np.arange(added)
+    return Air(points, (number < len(built)) | (number >= added - _CIRCLE), triangles[solid])
 
 
-def _graded_points(start, end, centre, radius):
-    """Points on ever coarser triangular grids, each about as far from its neighbours as from the outline."""
+def _walls(start, walls, centre, radius):
+    """The ends of the walls within the circle that are no points of the outline (k, 2), each once, and the walls (w, 2)
+    as numbers of the outline's points `start` and, after them, of these."""
+    if walls is None or not len(walls):
+        return np.empty((0, 2)), np.empty((0, 2), np.int64)
+    walls = _within_circle(walls, centre, _WALLED * _RADIUS * radius)
+    points, number = np.unique(np.vstack([start, walls.reshape(-1, 2)]), axis=0, return_inverse=True)
+    number = number.ravel()
+    known = np.full(len(points), -1)
+    known[number[: len(start)]] = np.arange(len(start))
+    new = known < 0
+    known[new] = len(start) + np.arange(new.sum())
+    return points[new], known[number[len(start) :]].reshape(-1, 2)
+
+
+def _within_circle(walls, centre, radius):
+    """The parts of segments (w, 2, 2) within a circle, in pieces that are short beside it."""
+    start, along = walls[:, 0], walls[:, 1] - walls[:, 0]
+    # Where a segment meets the circle: |start + t along - centre| = radius
+    a = (along**2).sum(axis=1)
+    b, c = ((start - centre) * along).sum(axis=1), ((start - centre) ** 2).sum(axis=1) - radius**2
+    root = np.sqrt(np.maximum(b * b - a * c, 0))
+    first, last = np.maximum((-b - root) / a, 0), np.minimum((-b + root) / a, 1)
+    inside = (b * b > a * c) & (first < last)
+    start, along, first, last = (each[inside] for each in (start, along, first, last))
+    count = np.maximum(np.ceil((last - first) * np.sqrt(a[inside]) * _PIECES / radius), 1).astype(int)
+    wall = np.repeat(np.arange(len(count)), count)
+    k = np.arange(len(wall)) - np.repeat(np.cumsum(count) - count, count)
+    ends = []
+    for step in (k, k + 1):
+        part = first[wall] + (last - first)[wall] * (step / count[wall])
+        end = start[wall] + part[:, None] * along[wall]
+        ends.append(np.where((part == 1)[:, None], walls[inside, 1][wall], end))  # to the last bit
+    return np.stack(ends, axis=1)
+
+
+def _graded_points(start, end, centre, radius, walls):
+    """Points on ever coarser triangular grids, each about as far from its neighbours as from the outline and from
+    walls (w, 2, 2)."""
     length = np.linalg.norm(end - start, axis=1)
     reach = _RADIUS * radius
     coarsest = step = reach / _COARSEST
@@ -82,6 +127,9 @@ def _graded_points(start, end, centre, radius):
     side = np.repeat(np.arange(len(start)), count)
     part = (np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count)) / count[side]
     samples = start[side] + part[:, None] * (end - start)[side]
+    if len(walls):
+        part = np.linspace(0, 1, _SAMPLES)[:, None, None]
+        samples = np.vstack([samples, (walls[:, 0] + part * (walls[:, 1] - walls[:, 0])).reshape(-1, 2)])
     tree = cKDTree(samples)
 
     grids = []

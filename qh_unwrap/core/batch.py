@@ -13,12 +13,13 @@ from .boundary import outer_loop
 from .certificate import enclosed_area
 from .chart import Surface, normalised_pieces
 from .distortion import checked_uv
-from .domain import Fixed
+from .domain import Fixed, Walls
 from .errors import PinError, ShapeError, UnwrapError, UVError
 from .pieces import joined
 from .report import Result, Shape
 from .settings import Settings
 from .topology import Topology, checked_arrays
+from .walls import clear_walls
 
 
 @dataclass(eq=False)
@@ -35,6 +36,7 @@ class Batch:
     start: np.ndarray  # (n, 2), the maps from which pins are led, seen like the UVs, which they are elsewhere
     has_start: np.ndarray  # (p,) bool
     crossing: np.ndarray  # (p,) bool, whether outlines that cross themselves are kept
+    walls: Walls = None  # seen like the UVs
 
     @property
     def has_pins(self) -> np.ndarray:
@@ -50,6 +52,13 @@ class Batch:
         return np.logical_or.reduceat(apart, self.surface.vertex_starts)
 
     @property
+    def has_walls(self) -> np.ndarray:
+        """(p,) bool"""
+        if self.walls is None:
+            return np.zeros(self.surface.piece_count, bool)
+        return np.array([walls is not None for walls in self.walls])
+
+    @property
     def fixed(self) -> Fixed:
         """What pins and partners fix."""
         return Fixed(self.pinned, self.uv, self.partner)
@@ -58,7 +67,8 @@ class Batch:
         """(p,) bool, whether the old UVs hold the new ones."""
         if settings.boundary == "KEEP":
             return self.has_uv
-        return self.has_uv & (self.has_pins | self.has_partners) & (settings.boundary == "FREE")
+        held = self.has_pins | self.has_partners | self.has_walls
+        return self.has_uv & held & (settings.boundary == "FREE")
 
     def apart(self, uv: np.ndarray) -> np.ndarray:
         """In which pieces (p,) bool of the map `uv` (n, 2) pins are elsewhere than they are to be."""
@@ -90,6 +100,7 @@ class Batch:
             start=self.start[rows],
             has_start=has_start,
             crossing=crossing,
+            walls=None if self.walls is None else [self.walls[k] for k in np.flatnonzero(pieces)],
         )
 
 
@@ -150,11 +161,11 @@ class Batched:
         if shape.face is not None and np.shape(shape.face) != (len(triangles),):
             raise ShapeError(f"there must be a face for each of the {len(triangles)} triangles")
         if n <= locality.MANY:
-            return Shape(vertices, triangles, uv, pinned, partner, start=start, crossing=shape.crossing)
+            return Shape(vertices, triangles, uv, pinned, partner, None, start, shape.crossing, shape.walls)
         mesh = self._sorted[k] = locality.Sorted(vertices, triangles)
         partner = None if partner is None else mesh.renumbered(partner)
         uv, pinned, start = (mesh.sorted(values) for values in (uv, pinned, start))
-        return Shape(mesh.vertices, mesh.triangles, uv, pinned, partner, start=start, crossing=shape.crossing)
+        return Shape(mesh.vertices, mesh.triangles, uv, pinned, partner, None, start, shape.crossing, shape.walls)
 
     def _joined(self, shapes, settings):
         while shapes:
@@ -198,7 +209,11 @@ def _batch(shapes, surface, settings):
     mirror = np.ones((len(shapes), 2))
     crossing = np.array([shape.crossing for shape in shapes.values()])
     index = np.array(list(shapes))
-    batch = Batch(surface, index, uv, has_uv, pinned, partner, mirror, start, has_start, crossing)
+    if any(shape.walls is not None for shape in shapes.values()):
+        walls = [shape.walls for shape in shapes.values()]
+    else:
+        walls = None
+    batch = Batch(surface, index, uv, has_uv, pinned, partner, mirror, start, has_start, crossing, walls)
     # Where the old UVs hold the new ones and are mirrored, unwrap as seen in a mirror.
     for k in np.flatnonzero(batch.in_frame(settings)):
         its = start[batch.rows_of(k)]
@@ -206,6 +221,11 @@ def _batch(shapes, surface, settings):
             batch.mirror[k, 0] = -1
     for each in (batch.uv, batch.start):
         each *= mirror[surface.vertex_piece]
+    if walls is not None:
+        for k, its in enumerate(walls):
+            if its is not None:
+                one, own = surface.one(k), batch.start[batch.rows_of(k)]
+                walls[k] = clear_walls(its * mirror[k], [own[loop] for loop in one.loops])
     return batch
 
 

@@ -64,8 +64,8 @@ def held_vertices(
 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """The vertices of a surface of one piece whose place is given, (n,) bool, where it is, (n, 2), and warnings.
 
-    `uv` (n, 2) are the UVs that it has, `pinned` (n,) bool its pinned vertices; an outline that is kept may cross itself
-    if `crossing`.
+    `uv` (n, 2) are the UVs that it has, `pinned` (n,) bool its pinned vertices; an outline that is kept may
+    cross itself if `crossing`.
     Raises `UVError`, `PinError` or `BoundaryError` where the settings cannot be followed.
     """
     warnings: tuple[str, ...] = ()

@@ -192,7 +192,8 @@ class Course(Improvement):
             if (value < _NEAR).any():
                 certified = certified_pieces(surface, start) if certified is None else certified
                 done = certified & (value <= ISOMETRIC) & ~batch.apart(start)
-                near = certified & (value < _NEAR) & ~done & ~(batch.has_pins | batch.has_partners) & directly
+                near = certified & (value < _NEAR) & ~done & directly
+                near &= ~(batch.has_pins | batch.has_partners | batch.has_walls)
         self.converged |= done
         if (done | near).any():
             yield
@@ -227,8 +228,8 @@ class Course(Improvement):
         self._make_airs(missing, start, airs)
         apart = batch.apart(start) & pieces
         self._put_pins(start, apart & missing)
-        # A valid map that pins hold stays, whether or not there is room for air; any other gives way to a circle.
-        crossed = missing & ~(batch.has_pins & ~wrong_pieces([batch.surface], start))
+        # A valid map that is held stays, whether or not there is room for air; any other gives way to a circle.
+        crossed = missing & ~((batch.has_pins | batch.has_walls) & ~wrong_pieces([batch.surface], start))
         if crossed.any():
             rows = batch.rows(crossed)
             start[rows] = natural_start(batch.surface.of(crossed), self.settings, "MEAN_VALUE")
@@ -241,7 +242,9 @@ class Course(Improvement):
             missing &= ~crossed | still
         for within in self._portions(pieces & ~missing):
             its = [airs[k] for k in np.flatnonzero(within).tolist()]
-            group = self._group(within, start, partial(Plane, airs=its, triangulate=self._triangulate))
+            walls = None if batch.walls is None else [batch.walls[k] for k in np.flatnonzero(within).tolist()]
+            make = partial(Plane, airs=its, triangulate=self._triangulate, walls=walls)
+            group = self._group(within, start, make)
             if following or (apart & within).any():
                 yield from self._led(group)
             else:
@@ -263,7 +266,8 @@ class Course(Improvement):
 
     def _make_airs(self, missing: np.ndarray, start: np.ndarray, airs: dict[int, Air]) -> None:
         """Add the air of the pieces that miss it, (p,) bool, and tick these off where it can be made."""
-        for k, air in enumerate(airs_around(self.batch.surface, start, self._triangulate, missing)):
+        given = self.batch.surface, start, self._triangulate
+        for k, air in enumerate(airs_around(*given, missing, self.batch.walls)):
             if air is not None:
                 airs[k] = air
                 missing[k] = False

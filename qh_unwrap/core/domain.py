@@ -26,6 +26,10 @@ _CHEAP = 10_000  # where there are fewer vertices than this, since it takes long
 _WORN = 0.3  # air is renewed when a triangle keeps less than this part of its quality
 
 
+Walls = Sequence[np.ndarray | None] | None
+"""For every piece segments (w, 2, 2) that it shall not cross, as `walls.clear_walls` returns them, or None."""
+
+
 class Domain(Protocol):
     """What iteration and refinement need to know.  The driver needs no more of any domain.
 
@@ -269,10 +273,19 @@ class Plane:
     fixed : of its vertices: pins
     airs : the air around every piece, each numbered as if its piece were alone
     triangulate : makes new air
+    walls : for every piece segments (w, 2, 2) that it shall not cross, or None
     """
 
-    def __init__(self, island: Surface, uv: np.ndarray, fixed: Fixed, airs: Sequence[Air], triangulate: Triangulator):
-        self.island, self._fixed, self._triangulate = island, fixed, triangulate
+    def __init__(
+        self,
+        island: Surface,
+        uv: np.ndarray,
+        fixed: Fixed,
+        airs: Sequence[Air],
+        triangulate: Triangulator,
+        walls: Walls = None,
+    ):
+        self.island, self._fixed, self._triangulate, self._walls = island, fixed, triangulate, walls
         self._take(list(airs), uv)
 
     def _take(self, airs, uv):
@@ -338,7 +351,7 @@ class Plane:
     def _remade(self, uv, pieces):
         """The map with new air around the chosen pieces; where none can be made the old air serves on."""
         n = len(self.island.vertices)
-        made = airs_around(self.island, uv[:n], self._triangulate, pieces)
+        made = airs_around(self.island, uv[:n], self._triangulate, pieces, self._walls)
         failed = pieces & np.array([air is None for air in made])
         if (failed | ~pieces).all():
             return uv, failed
@@ -375,19 +388,25 @@ class Plane:
             self._fixed.of(chosen, number),
             [self._as_it_lies(k, uv) for k in np.flatnonzero(pieces)],
             self._triangulate,
+            None if self._walls is None else [self._walls[k] for k in np.flatnonzero(pieces)],
         )
         smaller._quality = self._quality[pieces[self._air.piece]]
         return smaller, uv[pieces[self.vertex_piece]]
 
 
 def airs_around(
-    island: Surface, uv: np.ndarray, triangulate: Triangulator, pieces: np.ndarray | None = None
+    island: Surface, uv: np.ndarray, triangulate: Triangulator, pieces: np.ndarray | None = None, walls: Walls = None
 ) -> list[Air | None]:
-    """The air around every piece of an island with the map `uv` (n, 2), or of the chosen `pieces` (p,) bool; None where
-    none can be made."""
+    """The air around every piece of an island with the map `uv` (n, 2), or of the chosen `pieces` (p,) bool, with walls
+    in it; None where none can be made."""
     ends = np.append(island.vertex_starts, len(island.vertices))
     return [
-        make_air(uv[ends[k] : ends[k + 1]], [loop - ends[k] for loop in island.loops_of[k]], triangulate)
+        make_air(
+            uv[ends[k] : ends[k + 1]],
+            [loop - ends[k] for loop in island.loops_of[k]],
+            triangulate,
+            None if walls is None else walls[k],
+        )
         if pieces is None or pieces[k]
         else None
         for k in range(island.piece_count)

@@ -115,6 +115,12 @@ class Connected:
         part = components(len(self.outline) + len(faces), vertex, len(self.outline) + face)[1][len(self.outline) :]
         return np.isin(part, part[faces & self.faces_with(self._single)]) & self.faces_with(self._single)
 
+    def outline_sides(self) -> np.ndarray:
+        """The sides of the outlines in the map, (k, 2) corners each."""
+        _, following = around_faces(self._mesh[2], len(self.uv_vertex))
+        corners = np.flatnonzero(self._single & ~self.joined[self._mesh[1]])
+        return np.column_stack([corners, following[corners]])
+
     def islands(self, faces: np.ndarray, corner_triangles: np.ndarray) -> list[Island]:
         """The islands that the chosen faces (f,) bool make, with those on top of them that go along."""
         faces, doubles = faces.copy(), self._doubles

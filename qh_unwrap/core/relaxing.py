@@ -103,22 +103,22 @@ def _task(shape, settings):
         if flips:
             return UVError(f"{_counted(flips)}: relax it in both directions first")
         held[:, "VU".index(settings.direction)] = True
-    is_free = not held[_rim(triangles, n)].all()
+    is_free = not held[rim(triangles, n)].all()
     made = Settings(
         boundary="FREE" if is_free else "KEEP",
         balance=settings.balance,
         refine=settings.steps,
         initial="CURRENT" if is_free and not flips else "AUTO",
     )
-    if held.any():
-        return _Task(made, dataclasses.replace(shape, uv=uv, pinned=held, crossing=True))
+    if held.any() or (shape.walls is not None and not flips):
+        return _Task(made, dataclasses.replace(shape, uv=uv, pinned=held if held.any() else None, crossing=True))
     mirrored = is_mirrored(corners_of(uv, triangles))
     seen = None if flips else uv * (-1, 1) if mirrored else uv
-    return _Task(made, dataclasses.replace(shape, uv=seen, pinned=None), mirrored, is_loose=True)
+    return _Task(made, dataclasses.replace(shape, uv=seen, pinned=None, walls=None), mirrored, is_loose=True)
 
 
-def _rim(triangles, n):
-    """The vertices on the boundary, (k,)."""
+def rim(triangles: np.ndarray, n: int) -> np.ndarray:
+    """The vertices on the boundary of triangles (m, 3) with n vertices, (k,)."""
     edges, of = numbered_edges(triangles, n)
     return np.unique(edges[np.bincount(of.ravel(), minlength=len(edges)) == 1])
 

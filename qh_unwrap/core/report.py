@@ -24,7 +24,9 @@ class Shape:
                (boundary FREE or KEEP, with `uv`)
     start      (n, 2), the map to begin with, if it is another one than `uv`: pins are led from it to where `uv` has
                them (boundary FREE, start AUTO); one with flips is not taken
-    crossing   whether an outline that crosses itself is kept all the same (boundary KEEP), so that the map overlaps itself
+    crossing   whether an outline that crosses itself is kept all the same (boundary KEEP)
+    walls      (w, 2, 2), segments in the frame of `uv` that the outline must not cross (boundary FREE); those that
+               cross it already, or each other, do not count
     face       (m,) int, the polygon that each triangle is a part of, where warnings are to speak of polygons
     """
 
@@ -36,6 +38,7 @@ class Shape:
     face: np.ndarray | None = None
     start: np.ndarray | None = None
     crossing: bool = False
+    walls: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
