@@ -100,7 +100,7 @@ class Batch:
             start=self.start[rows],
             has_start=has_start,
             crossing=crossing,
-            walls=None if self.walls is None else [self.walls[k] for k in np.flatnonzero(pieces)],
+            walls=None if self.walls is None else [self.walls[k] for k in np.flatnonzero(pieces).tolist()],
         )
 
 

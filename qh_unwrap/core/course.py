@@ -110,8 +110,9 @@ class Course(Improvement):
     def _outlined(self, current: np.ndarray | None = None) -> Steps:
         """With outlines that are held; from the `current` map or an initial one."""
         batch, settings = self.batch, self.settings
-        given = batch.uv, batch.has_uv, batch.pinned, batch.crossing
-        held, values, warnings, faults = held_outlines(batch.surface, settings, *given)
+        surface, crossing = batch.surface, batch.crossing
+        outlines = held_outlines(surface, settings, batch.uv, batch.has_uv, batch.pinned, crossing)
+        held, values, warnings, faults = outlines
         self.faults.update(faults)
         self.warnings = warnings
         good = np.array([k not in faults for k in range(batch.surface.piece_count)])

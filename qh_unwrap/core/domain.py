@@ -388,7 +388,7 @@ class Plane:
             self._fixed.of(chosen, number),
             [self._as_it_lies(k, uv) for k in np.flatnonzero(pieces)],
             self._triangulate,
-            None if self._walls is None else [self._walls[k] for k in np.flatnonzero(pieces)],
+            None if self._walls is None else [self._walls[k] for k in np.flatnonzero(pieces).tolist()],
         )
         smaller._quality = self._quality[pieces[self._air.piece]]
         return smaller, uv[pieces[self.vertex_piece]]
