@@ -157,7 +157,7 @@ class Unwrapper:
     def _made(self, course, given):
         batch, surface = course.batch, course.batch.surface
         chosen = course.placed(course.best)
-        before = measure_pieces(surface, batch.uv) if batch.has_uv.any() else [None] * surface.piece_count
+        before = measure_pieces(surface, batch.start) if batch.has_uv.any() else [None] * surface.piece_count
         initial, after = measure_pieces(surface, course.start), measure_pieces(surface, chosen)
         certified = course.sure.copy()
         if not certified.all():
