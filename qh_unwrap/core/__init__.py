@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Quasi-harmonic maps of surfaces to the plane (Zayer, Roessl, Seidel 2005), on NumPy and SciPy alone.
 
-`unwrap` makes UVs, `distortion` measures them, `Settings` says how; `cut_open` and `cut_to` find seams, `SeamSettings`
-says where; errors are `UnwrapError`.
+`unwrap` makes UVs, `distortion` measures them, `Settings` says how; `relax_islands` and `straighten_islands` better
+those that there are; `cut_open` and `cut_to` find seams, `SeamSettings` says where; errors are `UnwrapError`.
 """
 
 from .chart import Surface
@@ -11,6 +11,8 @@ from .distortion import Distortion, distortion
 from .edge_costs import Wishes
 from .errors import UnwrapError
 from .obtuse import has_positive_weights, refine_obtuse
+from .relax_settings import RelaxSettings, StraightenSettings
+from .relaxing import relax_islands, straighten_islands
 from .report import Report, Result, Shape, State
 from .seam_settings import SeamSettings
 from .seams import SeamResult, SeamState, cut_open, cut_to
@@ -24,6 +26,7 @@ __all__ = [
     "ChartSeams",
     "Distortion",
     "Polygons",
+    "RelaxSettings",
     "Report",
     "Result",
     "SeamResult",
@@ -32,6 +35,7 @@ __all__ = [
     "Settings",
     "Shape",
     "State",
+    "StraightenSettings",
     "Surface",
     "Topology",
     "UnwrapError",
@@ -42,6 +46,8 @@ __all__ = [
     "distortion",
     "has_positive_weights",
     "refine_obtuse",
+    "relax_islands",
+    "straighten_islands",
     "unwrap",
     "unwrap_islands",
     "unwrap_steps",
