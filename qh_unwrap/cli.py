@@ -6,22 +6,15 @@ Exit codes: 0 everything unwrapped, 1 something failed (the rest is written), 2 
 """
 
 import argparse
-import dataclasses
 import json
 import os
-import traceback
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
-from . import console, flags
-from .addon import stopping, streams, writing
-from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
-from .addon.failures import FileError, UsageError
-from .addon.options import MeshOptions, SeamOptions
-from .core import Settings, UnwrapError
-from .core.seam_settings import SeamSettings
-from .core.stepping import finished, mapped
-from .patching.original import PatchError
+from . import console, flags, single
+from .addon import stopping
+from .addon.document import OK, PARTIAL, USAGE, Record
+from .addon.failures import UsageError
 
 _command = None
 
@@ -49,10 +42,10 @@ def main(argv=None):
         except UsageError as error:
             args, record = _understood(argv), Record()
             record.fail(USAGE, error)
-            _finish(args, record)
+            single.finish(args, record)
         else:
             bar = console.Bar(wanted=not args.quiet)
-            record = _carried_out(args, bar)
+            record = single.carried_out(args, bar)
             bar.close()
         with suppress(stopping.Stopped):  # all is done: who stops now has read enough
             _show(args, record)
@@ -86,7 +79,7 @@ def unwrap_file(path, output=None, **options):
     if args.uv_map is not None and args.texcoord is not None:
         raise UsageError("uv_map and texcoord exclude each other")
     args.input, args.output = os.fspath(path), Path(output) if output is not None else None
-    record = _carried_out(args)
+    record = single.carried_out(args)
     if record.exit_code == USAGE:
         raise UsageError(record.error)
     return record.to_dict()
@@ -106,159 +99,9 @@ def _understood(argv):
         args, others = parser.parse_known_args(argv)
     except UsageError:
         args, others = parser.parse_args([]), []
-    if args.json and any(_is_same(args.json, each.partition("=")[2] or each) for each in others):
+    if args.json and any(single.is_same(args.json, each.partition("=")[2] or each) for each in others):
         args.json = None  # it names the input, or another file
     return args
-
-
-def _is_same(one, other):
-    return os.path.realpath(one) == os.path.realpath(other)
-
-
-def _carried_out(args, progress=None):
-    """Do it; returns the `Record` of it, which is in the file for the report as well if one is wanted."""
-    record = Record()
-    try:
-        _run(args, record, progress)
-    except UsageError as error:
-        record.fail(USAGE, error)
-    except FileError as error:
-        record.fail(FAILED, error)
-    except stopping.Stopped as stop:
-        stopping.heard()
-        record.fail(stop.exit_code, stop)
-    except Exception as error:  # a fault of ours: the report is written all the same
-        traceback.print_exc()
-        record.fail(FAILED, f"{type(error).__name__}: {error}")
-    _finish(args, record)
-    return record
-
-
-def _finish(args, record):
-    record.begin(None)
-    try:
-        _keep(args, record)
-    except FileError as error:
-        if record.exit_code in (OK, PARTIAL):  # else there is something worse to tell
-            record.fail(PARTIAL if record.files else FAILED, error)
-
-
-def _run(args, record, progress):
-    record.input, record.output = str(args.input), str(args.output) if args.output else None
-    record.strict = bool(args.strict)
-    _check_paths(args)
-    if args.weld is None:
-        args.weld = Path(args.input).suffix.lower() in flags.SPLIT
-    try:
-        vars(args).update(args.cut)
-        kinds = Settings, MeshOptions, SeamSettings, SeamOptions
-        settings, options, seam_settings, seam_options = (_made_from(args, kind) for kind in kinds)
-        settings.check_together()
-    except UnwrapError as error:
-        raise UsageError(error) from None
-    values = dataclasses.asdict(settings) | dataclasses.asdict(options)
-    if options.cut != 'NEVER':
-        values |= dataclasses.asdict(seam_settings) | dict(vertex_group=seam_options.vertex_group)
-    record.settings = {name: getattr(value, "item", lambda value=value: value)() for name, value in values.items()}
-    with stopping.undisturbed(), streams.quiet():
-        try:
-            import bpy
-        except ImportError:
-            raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
-        from .addon import choosing, files, jobs, patches, preview, selection
-    record.blender = bpy.app.version_string
-
-    _check_formats(args, files, preview)
-    record.write = patches.mode(args.write, args.input, args.output)
-    _keep(args, record)  # which says that the run is not finished, in place of what an earlier one said
-    record.begin("read")
-    with _at_file("read", args.input, record):
-        files.load(args.input)
-    record.warn(files.missing_pictures())
-    choice = choosing.choose(args.object, args.collection)
-    record.skipped = choice.skipped
-    objects = choice.required()
-    maps = choosing.Maps(objects, args.uv_map, args.texcoord)
-    _check_room(args, objects, files)
-    record.begin("unwrap")
-    if args.seams_from_islands:
-        files.mark_cuts(objects, options)
-    targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
-    targets = choice.narrowed(targets, args.material)
-    objects = choice.required()
-    maps.make_missing(objects)
-    patch = patches.Patch(args.input, objects, maps) if record.write == patches.PATCH else None
-
-    def step(share):
-        stopping.check()
-        if progress:
-            progress(share)
-
-    with streams.quiet():
-        steps = jobs.cut_and_unwrap(targets, settings, options, bpy.context, seam_settings, seam_options)
-        outcomes, cuts = finished(mapped(step, steps))
-    record.cuts = [cut.to_dict() for cut in cuts if cut.new.any()]
-    record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
-    record.begin("write")
-    if record.done:
-        _write(args, record, maps, targets, options, patch)
-    record.judge()
-
-
-def _write(args, record, maps, targets, options, patch):
-    from .addon import checking, files, losses, preview
-
-    named = {outcome.obj for outcome in record.done}
-    done = {target.obj for target in targets if target.obj.name in named}
-
-    def draw(path):
-        preview.render(targets, record.outcomes, options, path)
-
-    with writing.Staging(overwrite=args.overwrite) as staging:
-        if args.preview:
-            with _at_file("write", args.preview, record):
-                staging.write(args.preview, draw, checking.check_image)
-        if args.output:
-            with _at_file("write", args.output, record):
-                is_patched = patch and _patch(args, record, patch, staging)
-            if args.output.suffix.lower() not in losses.ONE_MAP:  # of which the active one is that with the new UVs
-                maps.restore(done)
-            if not is_patched:
-                record.losses = losses.of(args.output)
-                with _at_file("write", args.output, record):
-                    files.stage(staging, args.output)
-        try:
-            with _at_file("write", args.output or args.preview, record):
-                staging.put_in_place()
-        finally:
-            record.files = staging.placed
-
-
-def _patch(args, record, patch, staging):
-    """Whether the patched file waits in `staging`; if not, it is to be exported, and `record` says why."""
-    try:
-        patch.stage(staging, args.output, record.done)
-    except PatchError as refusal:
-        if args.write:
-            raise FileError(f"it cannot be patched, {refusal}: use --write export") from None
-        record.write, record.not_patched = "export", str(refusal)
-    return not record.not_patched
-
-
-def _keep(args, record):
-    """Write the report, if one is wanted and nothing is in its way but a report of the same run."""
-    if not args.json or str(args.json) == "-":
-        return
-    if not record.is_kept and args.json.exists() and not (args.overwrite and args.json.is_file()):
-        return
-    text = json.dumps(record.to_dict(), indent=2) + "\n"
-    try:
-        with writing.Staging(overwrite=True) as staging:
-            staging.write_text(args.json, text)
-            staging.put_in_place()
-    except (OSError, FileError) as error:
-        raise FileError(f"cannot write {args.json}: {error}") from error
-    record.is_kept = True
 
 
 def _show(args, record):
@@ -271,80 +114,3 @@ def _show(args, record):
         console.show_outcomes(told, others, verbose=args.verbose, quiet=args.quiet)
     if record.error:
         console.show(f"qh-unwrap: error: {record.error}", error=True)
-
-
-@contextmanager
-def _at_file(verb, path, record):
-    told = []
-    try:
-        with streams.quiet(told):
-            yield
-    except (RuntimeError, OSError, FileError) as error:
-        stopping.check()
-        is_full = verb == "write" and writing.is_full(path)  # which Blender does not always say
-        raise FileError(f"cannot {verb} {path}: {_reason(error)}{' (the disk is full)' if is_full else ''}") from error
-    record.warn(told)
-
-
-def _reason(error):
-    """One line of what Blender says, which may be a traceback."""
-    lines = [line for line in str(error).splitlines() if line.strip() and not line.startswith("Location:")]
-    return lines[-1].removeprefix("Error: ") if lines else type(error).__name__
-
-
-def _made_from(args, kind):
-    names = [field.name for field in dataclasses.fields(kind)]
-    return kind(**{name: getattr(args, name) for name in names if hasattr(args, name)})
-
-
-def _check_paths(args):
-    """Raise `UsageError` where the files cannot be meant, before anything is written, the report included."""
-    if args.input != "suzanne":
-        args.input = Path(args.input)
-        if args.json and _is_same(args.json, args.input):
-            args.json = None
-            raise UsageError(f"--json would replace the input {args.input}: choose another name")
-        if not args.input.is_file():
-            raise UsageError(f"there is no file {args.input}")
-    report = args.json if str(args.json) != "-" else None
-    places = {}
-    sibling = None if args.write == "patch" else _sibling(args.output)
-    for path in filter(None, (args.output, sibling, report, args.preview)):
-        place = os.path.realpath(path)
-        if place in places:
-            args.json = None
-            raise UsageError(f"{path} is asked for twice: choose another name")
-        places[place] = path
-    for path in places.values():
-        if not path.absolute().parent.is_dir():
-            raise UsageError(f"there is no folder {path.absolute().parent}")
-        if path.exists() and not path.is_file():
-            raise UsageError(f"{path} is a folder, or no file to write to")
-        if path.exists() and not args.overwrite:
-            raise UsageError(f"{path} exists: choose another name, or pass --overwrite")
-    for path in places.values():
-        writing.check_folder(path)
-
-
-def _sibling(path):
-    """The other file that the format writes, if any."""
-    suffix = {".obj": ".mtl", ".gltf": ".bin"}.get(path.suffix.lower()) if path else None
-    return path.with_suffix(suffix) if suffix else None
-
-
-def _check_formats(args, files, preview):
-    if args.input != "suzanne" and args.input.suffix.lower() not in files.READERS:
-        raise UsageError(f"cannot read {args.input}: use {', '.join(files.READERS)}")
-    if args.output and args.output.suffix.lower() not in files.WRITERS:
-        raise UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(files.WRITERS)}")
-    if args.preview and args.preview.suffix.lower() not in preview.FORMATS:
-        raise UsageError(f"cannot write {args.preview}: pictures can be {', '.join(preview.FORMATS)}")
-    if args.texcoord is not None and not (isinstance(args.texcoord, int) and args.texcoord >= 0):
-        raise UsageError(f"--texcoord is {args.texcoord!r}: choose a whole number from 0")
-
-
-def _check_room(args, objects, files):
-    sizes = {args.preview: 100_000} if args.preview else {}
-    if args.output:
-        sizes[args.output] = files.likely_size(args.output, args.input, objects)
-    writing.check_room(sizes)
