@@ -8,13 +8,15 @@ Exit codes: 0 everything unwrapped, 1 something failed (the rest is written), 2 
 import argparse
 import json
 import os
+import sys
 from contextlib import suppress
 from pathlib import Path
 
 from . import console, flags, single
 from .addon import stopping
-from .addon.document import OK, PARTIAL, USAGE, Record
-from .addon.failures import UsageError
+from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
+from .addon.failures import FileError, UsageError
+from .farm import batch, process, templates
 
 _command = None
 
@@ -34,9 +36,12 @@ def unregister():
 
 
 def main(argv=None):
+    argv = sys.argv[1:] if argv is None else list(argv)
     with stopping.stoppable():
+        if argv[:1] == ["farm"]:
+            return _farm(argv[1:])
         try:
-            args = flags.parser().parse_args(argv)
+            args = flags.parsed(argv)
         except SystemExit as stop:  # argparse, after --help
             return stop.code
         except UsageError as error:
@@ -44,12 +49,45 @@ def main(argv=None):
             record.fail(USAGE, error)
             single.finish(args, record)
         else:
+            if args.output_folder is not None:
+                return batch.carried_out(args)
             bar = console.Bar(wanted=not args.quiet)
             record = single.carried_out(args, bar)
             bar.close()
         with suppress(stopping.Stopped):  # all is done: who stops now has read enough
             _show(args, record)
         return record.exit_code
+
+
+def _farm(argv):
+    """What comes after the word `farm`."""
+    try:
+        if argv[:1] and argv[0] in templates.PRINTED and "--help" not in argv:
+            console.show(templates.PRINTED[argv[0]](_for_tasks(argv[1:])).rstrip())
+            return OK
+        args = flags.farm_parser().parse_args(argv)
+        if args.word == "worker":
+            return process.serve()
+        code, summary = batch.report_folder(args.folder, args.files, overwrite=args.overwrite)
+    except SystemExit as stop:  # argparse, after --help
+        return stop.code
+    except (UsageError, FileError) as error:
+        console.show(f"qh-unwrap: error: {error}", error=True)
+        return USAGE if isinstance(error, UsageError) else FAILED
+    console.show(summary)
+    return code
+
+
+def _for_tasks(argv):
+    """The flags for the tasks of a job, which are right and leave alone what the job decides."""
+    args = flags.parsed(["a.obj", "-O", "a", *argv])
+    for name in ("list", "only", "report", "progress", "dask", "output", "json", "preview"):
+        if getattr(args, name) is not None:
+            raise UsageError(f"--{name} is not for the tasks of a job, which decides that itself")
+    if args.input != ["a.obj"] or args.output_folder != Path("a"):
+        raise UsageError("the job itself says which files are unwrapped, and to which folder: give other flags alone")
+    single.settings_of(args)
+    return argv
 
 
 def unwrap_file(path, output=None, **options):
@@ -85,7 +123,7 @@ def unwrap_file(path, output=None, **options):
     return record.to_dict()
 
 
-_NOT_IN_PYTHON = ("input", "output", "quiet", "verbose")
+_NOT_IN_PYTHON = ("input", "output", "quiet", "verbose", *flags.BATCH)
 _REPEATABLE = ("object", "collection", "material")
 
 

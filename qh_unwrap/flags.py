@@ -8,6 +8,7 @@ from pathlib import Path
 from . import __version__
 from .addon.failures import UsageError
 from .addon.options import MeshOptions, SeamOptions
+from .addon.suffixes import SPLIT
 from .core import Settings
 from .core.seam_settings import SeamSettings
 
@@ -24,6 +25,8 @@ examples:
       for a pipeline: 1 if an island is not certified, and all the numbers in a file
   qh-unwrap scene.blend -o scene.blend --overwrite --object 'Wall*' --uv-map Lightmap --placement PACK
       pack a second UV map of some objects, in the same file
+  qh-unwrap models/*.glb -O unwrapped --jobs 4 --resume --report report.html
+      many files, four at a time; after an interruption the same command goes on
   qh-unwrap model.obj --boundary CIRCLE --balance 0.5 --refine 0 --preview picture.png
       look at the published map, and write nothing else
 
@@ -33,6 +36,9 @@ exit codes:
   2  wrong usage
   3  nothing could be written: nothing was unwrapped, or a file could not be read or written
   130, 143  stopped by Ctrl C or SIGTERM; nothing half done is left
+with -O FOLDER: 0 if every file ends with 0, else 1 if some were written, 3 if none was
+
+farms: qh-unwrap farm --help
 """
 _NEEDS = {  # what each flag counts with, where its description does not say so
     "aspect": "only with --boundary RECTANGLE",
@@ -49,7 +55,6 @@ _CUT = (
     "never: leave closed islands as they are; needed: open what is closed or has handles along short seams; a number"
     " like 1.03: go on cutting where it stretches most, until the mean distortion is no larger (default needed)"
 )
-SPLIT = (".glb", ".gltf", ".stl", ".ply")  # what has its vertices split, or each face for itself
 
 
 class Parser(argparse.ArgumentParser):
@@ -65,7 +70,7 @@ def parser():
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    made.add_argument("input", metavar="INPUT", help=_INPUT)
+    made.add_argument("input", metavar="INPUT", nargs="*", help=_INPUT)
     made.add_argument("-o", "--output", type=Path, help="file to write, in any of these formats except .stl")
     made.add_argument("--object", action="append", metavar="NAME", help="unwrap this object only; may be repeated")
     made.add_argument("--seams-from-islands", action="store_true", help="first mark the cuts of the old UVs as seams")
@@ -103,12 +108,82 @@ def parser():
     loudness = made.add_mutually_exclusive_group()
     loudness.add_argument("--quiet", action="store_true", help="show nothing but errors")
     loudness.add_argument("--verbose", action="store_true", help="show every island, however many there are")
+    _add_batch(made.add_argument_group("many files", _MANY))
     made.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     for title, kinds in _GROUPS.items():
         group = made.add_argument_group(title)
         for field in (field for kind in kinds for field in dataclasses.fields(kind) if field.name not in _IN_CUT):
             action = group.add_argument(f"--{field.name.replace('_', '-')}", **_argument(field))
             action.help = _help(field).replace("%", "%%")
+    return made
+
+
+def parsed(argv):
+    """The arguments; raises `UsageError` where they do not go together, and `SystemExit` after --help."""
+    made = parser()
+    args = made.parse_intermixed_args(argv)
+    if not (args.input or args.list):
+        made.error("the following arguments are required: INPUT")
+    if args.output_folder is None:
+        given = [name for name in BATCH if getattr(args, name) != made.get_default(name)]
+        if given or len(args.input) > 1:
+            what = f"--{given[0].replace('_', '-')}" if given else "more than one INPUT"
+            made.error(f"{what} needs -O FOLDER")
+        args.input = args.input[0]
+    return args
+
+
+def _add_batch(group):
+    """The flags for many files, all of which are in `BATCH`."""
+    group.add_argument(
+        "-O", "--output-folder", type=Path, metavar="FOLDER", help="folder for the outputs, which is made if need be"
+    )
+    group.add_argument(
+        "--name",
+        metavar="PATTERN",
+        default="{stem}_uv{suffix}",
+        help="what each output is called: {stem} and {suffix} are those of the input, {folder} is its folder from the"
+        " one that all inputs are in (default {stem}_uv{suffix})",
+    )
+    group.add_argument("--list", type=Path, metavar="FILE", help="take the inputs from the lines of a text file")
+    group.add_argument("--only", metavar="NUMBERS", help="unwrap only some of the inputs, such as 1-10,15")
+    group.add_argument("--jobs", type=int, metavar="N", help="how many files to unwrap at a time (default 1)")
+    group.add_argument(
+        "--timeout", type=float, metavar="SECONDS", help="give up a file that takes longer, at its second try"
+    )
+    group.add_argument("--memory", type=float, metavar="GB", help="give up a file that takes more, at its second try")
+    group.add_argument("--resume", action="store_true", help="leave out what an earlier run has done in the same way")
+    group.add_argument(
+        "--report", type=Path, metavar="FILE", action="append", help="write a .csv or .html report; may be repeated"
+    )
+    group.add_argument(
+        "--progress",
+        choices=("json", "openjd"),
+        help="json: print an object in a line for each file, and nothing else; openjd: lines for Open Job Description",
+    )
+    group.add_argument("--dask", metavar="ADDRESS", help="unwrap on the Dask cluster of the scheduler at this address")
+
+
+BATCH = "output_folder", "name", "list", "only", "jobs", "timeout", "memory", "resume", "report", "progress", "dask"
+_MANY = "Unwrap each file in a worker process.  A file that crashes, hangs or takes too much memory is tried twice."
+
+
+def farm_parser():
+    """The parser of what comes after the word `farm`."""
+    made = Parser(prog="qh-unwrap farm", description="Farms and their schedulers.", allow_abbrev=False)
+    words = made.add_subparsers(dest="word", required=True, metavar="WORD", parser_class=Parser)
+    for name, title in (("openjd", "a job template for Open Job Description"), ("flamenco", "a job type for Flamenco")):
+        text = f"print {title}; FLAGS are those with which to unwrap"
+        word = words.add_parser(
+            name, help=text, description=text, usage=f"qh-unwrap farm {name} [FLAGS]", add_help=False
+        )
+        word.set_defaults(flags=[])
+    text = "write a report of all that was written to a folder"
+    word = words.add_parser("report", help=text, description=text)
+    word.add_argument("folder", type=Path, metavar="FOLDER", help="what -O was")
+    word.add_argument("files", type=Path, metavar="FILE", nargs="+", help="a .csv or .html file")
+    word.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    words.add_parser("worker", help="be a worker: for qh-unwrap itself")
     return made
 
 

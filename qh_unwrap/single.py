@@ -8,8 +8,7 @@ import traceback
 from contextlib import contextmanager
 from pathlib import Path
 
-from . import flags
-from .addon import stopping, streams, writing
+from .addon import stopping, streams, suffixes, writing
 from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
 from .addon.failures import FileError, UsageError
 from .addon.options import MeshOptions, SeamOptions
@@ -65,7 +64,7 @@ def _run(args, record, progress):
         from .addon import choosing, files, jobs, patches, preview, selection
     record.blender = bpy.app.version_string
 
-    _check_formats(args, files, preview)
+    _check_formats(args, preview)
     record.write = patches.mode(args.write, args.input, args.output)
     _keep(args, record)  # which says that the run is not finished, in place of what an earlier one said
     record.begin("read")
@@ -186,7 +185,7 @@ def settings_of(args):
     """The `Settings`, `MeshOptions`, `SeamSettings` and `SeamOptions` of the flags; raises `UsageError`."""
     given = vars(args) | args.cut
     if args.weld is None:
-        given["weld"] = Path(args.input).suffix.lower() in flags.SPLIT
+        given["weld"] = str(args.input).lower().endswith(suffixes.SPLIT)
     try:
         made = [_made_from(given, kind) for kind in (Settings, MeshOptions, SeamSettings, SeamOptions)]
         made[0].check_together()
@@ -211,7 +210,7 @@ def _check_paths(args):
             raise UsageError(f"there is no file {args.input}")
     report = args.json if str(args.json) != "-" else None
     places = {}
-    sibling = None if args.write == "patch" else _sibling(args.output)
+    sibling = suffixes.sibling(args.output) if args.output and args.write != "patch" else None
     for path in filter(None, (args.output, sibling, report, args.preview)):
         place = os.path.realpath(path)
         if place in places:
@@ -229,17 +228,11 @@ def _check_paths(args):
         writing.check_folder(path)
 
 
-def _sibling(path):
-    """The other file that the format writes, if any."""
-    suffix = {".obj": ".mtl", ".gltf": ".bin"}.get(path.suffix.lower()) if path else None
-    return path.with_suffix(suffix) if suffix else None
-
-
-def _check_formats(args, files, preview):
-    if args.input != "suzanne" and args.input.suffix.lower() not in files.READERS:
-        raise UsageError(f"cannot read {args.input}: use {', '.join(files.READERS)}")
-    if args.output and args.output.suffix.lower() not in files.WRITERS:
-        raise UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(files.WRITERS)}")
+def _check_formats(args, preview):
+    if args.input != "suzanne" and args.input.suffix.lower() not in suffixes.READ:
+        raise UsageError(f"cannot read {args.input}: use {', '.join(suffixes.READ)}")
+    if args.output and args.output.suffix.lower() not in suffixes.WRITTEN:
+        raise UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(suffixes.WRITTEN)}")
     if args.preview and args.preview.suffix.lower() not in preview.FORMATS:
         raise UsageError(f"cannot write {args.preview}: pictures can be {', '.join(preview.FORMATS)}")
     if args.texcoord is not None and not (isinstance(args.texcoord, int) and args.texcoord >= 0):

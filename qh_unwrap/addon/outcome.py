@@ -203,10 +203,15 @@ def change(before, after, name):
 
 def mean_change(outcomes, name):
     """The same of several that are done, in the mean over their surface; without "before" where one has none."""
-    after = _shown(_mean(outcomes, [getattr(outcome.after, name) for outcome in outcomes]))
+    after = _shown(mean_after(outcomes, name))
     if not all(outcome.before for outcome in outcomes):
         return after
     return f"{_shown(_mean(outcomes, [getattr(outcome.before, name) for outcome in outcomes]))} → {after}"
+
+
+def mean_after(outcomes, name):
+    """One measure of several that are done, in the mean over their surface."""
+    return float(_mean(outcomes, [getattr(outcome.after, name) for outcome in outcomes]))
 
 
 def told_of(reason, names):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from . import stopping
 from .failures import FileError
 
-_PREFIX = ".qh-unwrap-"
+_PREFIX = ".qh-unwrap-"  # of what waits for its place
 _LEAST = 1 << 14  # bytes: a disk with less is full
 
 
@@ -26,7 +26,12 @@ class Staging:
     """New files that wait beside their places until all of them are known to be good.
 
     Use it in a `with` statement: what was not put in place by its end is removed, whatever happened.
+
+    overwrite   whether files that exist may be replaced, or a function that is called with the path of each of them and
+                raises `FileError` where that one must stay
     """
+
+    ticket = ""  # stands in the names of all that waits, so that `sweep` finds what a process that was killed has left
 
     def __init__(self, *, overwrite):
         self._overwrite = overwrite
@@ -110,7 +115,9 @@ class Staging:
         if place.exists():
             if is_sibling and filecmp.cmp(file, place, shallow=False):
                 return  # such as a texture of the input, which is in the same folder
-            if not self._overwrite:
+            if callable(self._overwrite):
+                self._overwrite(path)
+            elif not self._overwrite:
                 raise FileError(f"{path} exists: choose another name, or pass --overwrite")
         if _device(place.parent) not in (None, _device(file)):  # the symbolic link leads to another disk
             distant = self._name_beside(place)
@@ -123,7 +130,7 @@ class Staging:
 
     def _folder_beside(self, path):
         with stopping.undisturbed():
-            folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=_PREFIX))
+            folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=f"{_PREFIX}{self.ticket}"))
             self._temporary.append(folder)
             return folder
 
@@ -134,6 +141,12 @@ class Staging:
             name = folder.with_name(f"{folder.name}-{path.name}")
             self._temporary.append(name)
             return name
+
+
+def sweep(folder, ticket):
+    """Remove what a process that is no more left in the folder, waiting for its place."""
+    for path in folder.glob(f"{_PREFIX}{ticket}*"):
+        _remove(path)
 
 
 def check_folder(path):
