@@ -21,7 +21,6 @@ class Asset:
     settings: str = ""  # a digest of what of them makes a difference
     owned: tuple = ()  # paths that may be replaced at any time: what is there was written for this asset
     old: tuple = ()  # paths that may be replaced if they were there before
-    overwrite: bool = False  # whether this goes for all paths
     since: float = 0.0  # when the batch began, by the clock of the file system
     timeout: float | None = None  # seconds
     ticket: str = ""  # of the attempt
@@ -39,7 +38,7 @@ class Asset:
         """Raise `FileError` where a file that exists may not be replaced for this asset: another one may need it."""
         if str(path) in self.owned:
             return
-        if not (self.overwrite or str(path) in self.old):
-            raise FileError(f"{path} exists, and is another one: {CURE}, or pass --overwrite")
+        if str(path) not in self.old:
+            raise FileError(f"{path} exists, and is another one: {CURE}, or remove it")
         if os.stat(path).st_mtime >= self.since:
             raise FileError(f"{path} was written for another file as well: {CURE}")

@@ -63,7 +63,7 @@ def _by(client, waiting, limits):
     import distributed
 
     futures = {client.submit(_unwrap, asset.to_dict(), tuple(limits), pure=False): asset for asset in waiting.values()}
-    for future in distributed.as_completed(futures):
+    for future in distributed.as_completed(futures, loop=client.loop):
         asset = futures.pop(future)
         if future.status in _LOST:
             return

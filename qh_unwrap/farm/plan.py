@@ -42,8 +42,8 @@ def planned(args):
     assets, done = [], []
     for number in numbers:
         path, output = inputs[number], outputs[number]
-        entry = ledger.read(output) if args.resume else None
-        if entry and _is_done(entry, path, output, settings):
+        entry = ledger.read(output) if args.resume or args.overwrite else None
+        if args.resume and entry and _is_done(entry, path, output, settings):
             done.append(entry)
             continue
         _check_free(args, output, entry)
@@ -55,7 +55,6 @@ def planned(args):
             settings=settings,
             owned=tuple(str(each) for each in _written(args, output)),
             old=tuple(entry.files) if entry else (),
-            overwrite=args.overwrite,
             timeout=args.timeout,
         )
         assets.append(asset)

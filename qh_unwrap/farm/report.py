@@ -9,6 +9,7 @@ from pathlib import Path
 from .. import __version__
 from ..addon import writing
 from ..addon.failures import FileError, UsageError
+from .entry import OK
 
 _COUNTED = ("objects", "islands", "certified", "failed", "flips", "collapsed", "faces")
 COLUMNS = ("input", "output", "status", "error", *_COUNTED, "stretch", "energy", "write", "warnings")
@@ -118,8 +119,8 @@ _FORMATS = {".csv": _csv, ".html": _html}
 
 def summary(entries):
     """How many there are of each status: "10 files: 8 ok, 1 partial, 1 crashed"."""
-    counts = {}
+    counts = {OK: 0} | dict.fromkeys(sorted(entry.status for entry in entries), 0)
     for entry in entries:
-        counts[entry.status] = counts.get(entry.status, 0) + 1
-    parts = ", ".join(f"{number} {status}" for status, number in sorted(counts.items(), key=lambda each: -each[1]))
+        counts[entry.status] += 1
+    parts = ", ".join(f"{number} {status}" for status, number in counts.items() if number)
     return f"{len(entries)} file{'' if len(entries) == 1 else 's'}: {parts or 'nothing was done'}"
