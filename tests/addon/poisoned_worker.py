@@ -31,9 +31,9 @@ def carried_out(args, unwrap=single.carried_out):
         eaten = []
         while True:
             eaten.append(b"x" * 50_000_000)
-            time.sleep(0.01)
+            time.sleep(0.002)
     if kind == "slow":
-        time.sleep(1)
+        time.sleep(0.5)
     return unwrap(args)
 
 

@@ -3,7 +3,6 @@
 
 import csv
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -64,7 +63,8 @@ def test_each_file_gets_an_output_and_a_line(tmp_path, capfd):
     page = tmp_path / "r.html"
     assert main([*inputs, "-O", str(out), "--jobs", "2", "--report", str(report), "--report", str(page)]) == 0
     assert sorted(path.name for path in out.iterdir() if path.name[0] != ".") == ["a_uv.obj", "b_uv.obj", "c_uv.obj"]
-    assert all("vt " in path.read_text() for path in out.glob("*.obj"))
+    assert main([inputs[1], "-o", str(tmp_path / "single.obj")]) == 0
+    assert (out / "b_uv.obj").read_bytes() == (tmp_path / "single.obj").read_bytes()
     assert "3 files: 3 ok" in capfd.readouterr().out
     found = rows(report)
     assert list(found) == ["a", "b", "c"]
@@ -75,18 +75,11 @@ def test_each_file_gets_an_output_and_a_line(tmp_path, capfd):
     assert text.count("data:image/png;base64,") == 3 and "3 files: 3 ok" in text
 
 
-def test_a_batch_writes_what_a_run_on_a_single_file_writes(tmp_path):
-    (source,) = sheets(tmp_path / "in", "a")
-    assert main([source, "-o", str(tmp_path / "single.obj"), "--balance", "0.5"]) == 0
-    assert main([source, "-O", str(tmp_path / "out"), "--balance", "0.5"]) == 0
-    assert (tmp_path / "out" / "a_uv.obj").read_bytes() == (tmp_path / "single.obj").read_bytes()
-
-
 def test_poison_costs_its_own_file_alone(tmp_path, poison):
     names = ["a", "crash", "b", "hang", "c", "eat", "d", "once", "e"]
     inputs = sheets(tmp_path / "in", *names)
     out, report = tmp_path / "out", tmp_path / "r.csv"
-    limits = ["--timeout", "2", "--memory", "1"]
+    limits = ["--timeout", "3", "--memory", "1"]
     assert main([*inputs, "-O", str(out), "--jobs", "2", *limits, "--report", str(report)]) == 1
     found = rows(report)
     assert {name: row["status"] for name, row in found.items()} == dict.fromkeys("abcde", "ok") | dict(
@@ -97,20 +90,6 @@ def test_poison_costs_its_own_file_alone(tmp_path, poison):
     assert "--timeout" in found["hang"]["error"] and "--memory" in found["eat"]["error"]
     written = {path.stem for path in out.glob("*.obj")}
     assert written == {f"{name}_uv" for name in [*"abcde", "once"]} and not leftovers(tmp_path)
-
-
-@linux
-def test_a_worker_that_is_killed_is_replaced(tmp_path, poison):
-    inputs = sheets(tmp_path / "in", "slow_1", "slow_2", "slow_3")
-    killed = []
-    program = start(*inputs, "-O", tmp_path / "out", "--report", tmp_path / "r.csv", "--progress", "json")
-    for line in program.stdout:
-        event = json.loads(line)
-        if event["event"] == "file" and not killed:
-            killed = workers_of(program)
-            os.kill(killed[0], signal.SIGKILL)
-    assert program.wait(60) == 0 and killed
-    assert [row["attempts"] for row in rows(tmp_path / "r.csv").values()] in (["1", "2", "1"], ["1", "1", "1"])
 
 
 def start(*arguments):
@@ -340,16 +319,15 @@ def test_a_worker_that_cannot_be_started_is_no_fault_of_files(tmp_path, monkeypa
 
 def test_dask_does_the_same_as_workers_here(tmp_path, poison):
     distributed = pytest.importorskip("distributed")
-    inputs = sheets(tmp_path / "in", *"abc", "crash", "once", "hang")
+    inputs = sheets(tmp_path / "in", *"ab", "crash", "once")
     cluster = distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None
     )
     with cluster:
-        flags = ["--dask", cluster.scheduler_address, "--timeout", "3"]
+        flags = ["--dask", cluster.scheduler_address]
         assert main([*inputs, "-O", str(tmp_path / "one"), *flags, "--report", str(tmp_path / "one.csv")]) == 1
         (tmp_path / "in" / "once.seen").unlink()
-    flags = ["--jobs", "2", "--timeout", "3"]
-    assert main([*inputs, "-O", str(tmp_path / "two"), *flags, "--report", str(tmp_path / "two.csv")]) == 1
+    assert main([*inputs, "-O", str(tmp_path / "two"), "--jobs", "2", "--report", str(tmp_path / "two.csv")]) == 1
     text = (tmp_path / "two.csv").read_text().replace(f"{tmp_path}/two", f"{tmp_path}/one")
     (tmp_path / "two.csv").write_text(text)
     assert alike(tmp_path / "one.csv", tmp_path / "two.csv")[0] == alike(tmp_path / "one.csv", tmp_path / "two.csv")[1]
