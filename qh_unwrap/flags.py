@@ -174,10 +174,7 @@ def farm_parser():
     words = made.add_subparsers(dest="word", required=True, metavar="WORD", parser_class=Parser)
     for name, title in (("openjd", "a job template for Open Job Description"), ("flamenco", "a job type for Flamenco")):
         text = f"print {title}; FLAGS are those with which to unwrap"
-        word = words.add_parser(
-            name, help=text, description=text, usage=f"qh-unwrap farm {name} [FLAGS]", add_help=False
-        )
-        word.set_defaults(flags=[])
+        words.add_parser(name, help=text, description=text, usage=f"qh-unwrap farm {name} [FLAGS]")
     text = "write a report of all that was written to a folder"
     word = words.add_parser("report", help=text, description=text)
     word.add_argument("folder", type=Path, metavar="FOLDER", help="what -O was")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Workers on the machines of a Dask cluster, which see the same folders as this one."""
 
+import logging
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -45,6 +46,7 @@ def unwrapped(assets, address, limits):
 def _connected(address, patience):
     import distributed
 
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is said once, in our words
     limit = time.monotonic() + patience
     while True:
         try:
