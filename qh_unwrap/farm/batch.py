@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from .. import single
-from ..addon import stopping
+from ..addon import stopping, writing
 from ..addon.document import FAILED, OK, PARTIAL, USAGE
 from ..addon.failures import FileError, UsageError
 from . import child, cluster, plan, pool, report, telling
@@ -61,19 +61,29 @@ def _run(args, teller, entries):
             teller.tell(entry, len(entries), count)
     finally:
         found = [entries[output] for output in todo.order if output in entries]
-        if found:
-            stopping.hold()  # the report of what was done is wanted in any case
-            try:
-                for path in reports:
-                    report.write(path, found)
-            finally:
-                stopping.release()
+        are_written = _write(reports, found, teller)
     code = exit_code(found)
+    if code == OK and not are_written:
+        code = PARTIAL
     seconds = time.monotonic() - start
     before = f"; {len(todo.done)} of them before" if todo.done else ""
     each = f", {seconds / len(todo.assets):.3f} s each" if todo.assets else ""
     teller.end(code, f"{report.summary(found)}{before}; {seconds:.1f} s{each}")
     return code
+
+
+def _write(reports, entries, teller):
+    """Write the reports, whatever else happens, and say so if that fails; returns whether they are there."""
+    stopping.hold()
+    try:
+        for path in reports if entries else ():
+            report.write(path, entries)
+    except FileError as error:
+        teller.fail(PARTIAL, error)
+        return False
+    finally:
+        stopping.release()
+    return True
 
 
 def exit_code(entries):
@@ -117,6 +127,8 @@ def _unwrapped(args, todo):
         return
     todo.folder.mkdir(exist_ok=True)
     since = Ledger(todo.folder).prepare()
+    for folder, ticket in todo.stale:
+        writing.sweep(folder, ticket)
     for folder in {Path(asset.output).parent for asset in todo.assets}:
         folder.mkdir(parents=True, exist_ok=True)
     assets = [replace(asset, since=since) for asset in todo.assets]

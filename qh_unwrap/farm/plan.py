@@ -23,6 +23,7 @@ class Plan(NamedTuple):
     assets: list  # that are to be unwrapped
     done: list  # entries of earlier runs
     order: list  # the outputs of both
+    stale: list  # folders, and tickets of attempts that were cut off there
 
 
 def planned(args):
@@ -39,7 +40,7 @@ def planned(args):
     options = {name: value for name, value in options.items() if name not in ("input", "output", "json", "preview")}
     numbers = naming.chosen(args.only, len(inputs)) if args.only else range(len(inputs))
     ledger = Ledger(folder)
-    assets, done = [], []
+    assets, done, stale = [], [], []
     for number in numbers:
         path, output = inputs[number], outputs[number]
         entry = ledger.read(output) if args.resume or args.overwrite else None
@@ -47,6 +48,8 @@ def planned(args):
             done.append(entry)
             continue
         _check_free(args, output, entry)
+        if entry and entry.is_unfinished and entry.ticket:
+            stale.append((output.parent, entry.ticket))
         asset = Asset(
             str(path),
             str(output),
@@ -60,7 +63,7 @@ def planned(args):
         assets.append(asset)
     for place in {_existing(Path(asset.output).parent) for asset in assets}:
         writing.check_folder(place / "file")
-    return Plan(folder, assets, done, [str(outputs[number]) for number in numbers])
+    return Plan(folder, assets, done, [str(outputs[number]) for number in numbers], stale)
 
 
 def _is_done(entry, path, output, settings):

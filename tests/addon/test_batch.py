@@ -11,9 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from qh_unwrap.addon import files, suffixes
+from qh_unwrap.addon.failures import FileError
 from qh_unwrap.cli import main
-from qh_unwrap.farm import child, naming, telling
-from qh_unwrap.farm.ledger import Ledger
+from qh_unwrap.farm import batch, child, cluster, naming, report, telling
+from qh_unwrap.farm.asset import Asset
+from qh_unwrap.farm.entry import Entry
+from qh_unwrap.farm.ledger import Ledger, digest
 
 _ROOT = Path(__file__).parents[2]
 _POISONED = [sys.executable, "-P", str(Path(__file__).with_name("poisoned_worker.py"))]
@@ -36,12 +40,9 @@ def rows(path):
         return {Path(row["input"]).stem: row for row in csv.DictReader(stream)}
 
 
-def alike(one, other):
-    """Whether two reports are equal but for times, hosts and order."""
-    return [
-        sorted(tuple(row[name] for name in row if name not in _VARYING) for row in rows(path).values())
-        for path in (one, other)
-    ]
+def lines(path):
+    """What a report says, but for times, hosts and order."""
+    return sorted(tuple(row[name] for name in row if name not in _VARYING) for row in rows(path).values())
 
 
 def contents(folder):
@@ -59,14 +60,14 @@ def poison(monkeypatch):
 
 def test_each_file_gets_an_output_and_a_line(tmp_path, capfd):
     inputs = sheets(tmp_path / "in", *"abc")
-    out, report = tmp_path / "out", tmp_path / "r.csv"
+    out, table = tmp_path / "out", tmp_path / "r.csv"
     page = tmp_path / "r.html"
-    assert main([*inputs, "-O", str(out), "--jobs", "2", "--report", str(report), "--report", str(page)]) == 0
+    assert main([*inputs, "-O", str(out), "--jobs", "2", "--report", str(table), "--report", str(page)]) == 0
     assert sorted(path.name for path in out.iterdir() if path.name[0] != ".") == ["a_uv.obj", "b_uv.obj", "c_uv.obj"]
     assert main([inputs[1], "-o", str(tmp_path / "single.obj")]) == 0
     assert (out / "b_uv.obj").read_bytes() == (tmp_path / "single.obj").read_bytes()
     assert "3 files: 3 ok" in capfd.readouterr().out
-    found = rows(report)
+    found = rows(table)
     assert list(found) == ["a", "b", "c"]
     assert {(row["status"], row["islands"], row["certified"], row["attempts"]) for row in found.values()} == {
         ("ok", "1", "1", "1")
@@ -78,10 +79,10 @@ def test_each_file_gets_an_output_and_a_line(tmp_path, capfd):
 def test_poison_costs_its_own_file_alone(tmp_path, poison):
     names = ["a", "crash", "b", "hang", "c", "eat", "d", "once", "e"]
     inputs = sheets(tmp_path / "in", *names)
-    out, report = tmp_path / "out", tmp_path / "r.csv"
+    out, table = tmp_path / "out", tmp_path / "r.csv"
     limits = ["--timeout", "3", "--memory", "1"]
-    assert main([*inputs, "-O", str(out), "--jobs", "2", *limits, "--report", str(report)]) == 1
-    found = rows(report)
+    assert main([*inputs, "-O", str(out), "--jobs", "2", *limits, "--report", str(table)]) == 1
+    found = rows(table)
     assert {name: row["status"] for name, row in found.items()} == dict.fromkeys("abcde", "ok") | dict(
         crash="crashed", hang="timed out", eat="out of memory", once="ok"
     )
@@ -121,8 +122,8 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc, an
 def test_a_run_that_was_ended_goes_on(tmp_path, number):
     """By Ctrl C, or without a chance to tidy up."""
     inputs = sheets(tmp_path / "in", "a", "slow_1", "slow_2", "b")
-    out, report = tmp_path / "out", tmp_path / "r.csv"
-    program = start(*inputs, "-O", out, "--report", report, "--progress", "json")
+    out, table = tmp_path / "out", tmp_path / "r.csv"
+    program = start(*inputs, "-O", out, "--report", table, "--progress", "json")
     while json.loads(program.stdout.readline())["event"] != "file":
         pass
     time.sleep(0.3)
@@ -137,12 +138,12 @@ def test_a_run_that_was_ended_goes_on(tmp_path, number):
     assert not leftovers(tmp_path)
     before = contents(out)
     assert out / "a_uv.obj" in before and out / "b_uv.obj" not in before
-    program = start(*inputs, "-O", out, "--report", report, "--resume", "--progress", "json")
+    program = start(*inputs, "-O", out, "--report", table, "--resume", "--progress", "json")
     events = [json.loads(line) for line in program.stdout]
     assert program.wait(60) == 0, program.stderr.read()
     assert [event["done"] for event in events if event["event"] == "file"] == [1, 2, 3, 4]
-    assert (out / "a_uv.obj").stat().st_mtime <= report.stat().st_mtime
-    assert {name: row["status"] for name, row in rows(report).items()} == dict.fromkeys(
+    assert (out / "a_uv.obj").stat().st_mtime <= table.stat().st_mtime
+    assert {name: row["status"] for name, row in rows(table).items()} == dict.fromkeys(
         ["a", "slow_1", "slow_2", "b"], "ok"
     )
 
@@ -252,15 +253,15 @@ def test_files_in_their_own_place(tmp_path):
 def test_files_that_fail_are_told_and_tried_again(tmp_path, capfd):
     inputs = sheets(tmp_path / "in", *"ab")
     Path(inputs[1]).write_text("nothing")
-    out, report = tmp_path / "out", tmp_path / "r.csv"
-    assert main([*inputs, "-O", str(out), "--report", str(report)]) == 1
+    out, table = tmp_path / "out", tmp_path / "r.csv"
+    assert main([*inputs, "-O", str(out), "--report", str(table)]) == 1
     assert "b.obj: failed" in capfd.readouterr().err
-    assert rows(report)["b"]["status"] == "failed" and "no mesh" in rows(report)["b"]["error"]
+    assert rows(table)["b"]["status"] == "failed" and "no mesh" in rows(table)["b"]["error"]
     assert main([inputs[1], "-O", str(out), "--resume"]) == 3
     sheets(tmp_path / "in", "z", "b")
-    assert main([*inputs, "-O", str(out), "--report", str(report), "--resume"]) == 0
+    assert main([*inputs, "-O", str(out), "--report", str(table), "--resume"]) == 0
     assert main(["farm", "report", str(out), str(tmp_path / "all.csv")]) == 0
-    assert alike(report, tmp_path / "all.csv")[0] == alike(report, tmp_path / "all.csv")[1]
+    assert lines(table) == lines(tmp_path / "all.csv")
 
 
 def test_no_texture_is_replaced_by_that_of_another_file(tmp_path):
@@ -270,10 +271,10 @@ def test_no_texture_is_replaced_by_that_of_another_file(tmp_path):
         (tmp_path / name / "t.png").write_bytes(name.encode())
         Path(path).write_text("mtllib m.mtl\nusemtl m\n" + Path(path).read_text())
     inputs = [str(tmp_path / name / f"{name}.obj") for name in "ab"]
-    report = tmp_path / "r.csv"
+    table = tmp_path / "r.csv"
     for flags in ([], ["--overwrite"]):
-        assert main([*inputs, "-O", str(tmp_path / "out"), "--report", str(report), *flags]) == 1
-        assert rows(report)["a"]["status"] == "ok" and "{stem}/{stem}" in rows(report)["b"]["error"]
+        assert main([*inputs, "-O", str(tmp_path / "out"), "--report", str(table), *flags]) == 1
+        assert rows(table)["a"]["status"] == "ok" and "{stem}/{stem}" in rows(table)["b"]["error"]
         assert (tmp_path / "out" / "t.png").read_bytes() == b"a"
     assert main([*inputs, "-O", str(tmp_path / "new"), "--name", "{stem}/{stem}{suffix}"]) == 0
     assert (tmp_path / "new" / "b" / "t.png").read_bytes() == b"b"
@@ -320,21 +321,20 @@ def test_a_worker_that_cannot_be_started_is_no_fault_of_files(tmp_path, monkeypa
 def test_dask_does_the_same_as_workers_here(tmp_path, poison):
     distributed = pytest.importorskip("distributed")
     inputs = sheets(tmp_path / "in", *"ab", "crash", "once")
-    cluster = distributed.LocalCluster(
+    machines = distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None
     )
-    with cluster:
-        flags = ["--dask", cluster.scheduler_address]
+    with machines:
+        flags = ["--dask", machines.scheduler_address]
         assert main([*inputs, "-O", str(tmp_path / "one"), *flags, "--report", str(tmp_path / "one.csv")]) == 1
         (tmp_path / "in" / "once.seen").unlink()
     assert main([*inputs, "-O", str(tmp_path / "two"), "--jobs", "2", "--report", str(tmp_path / "two.csv")]) == 1
     text = (tmp_path / "two.csv").read_text().replace(f"{tmp_path}/two", f"{tmp_path}/one")
     (tmp_path / "two.csv").write_text(text)
-    assert alike(tmp_path / "one.csv", tmp_path / "two.csv")[0] == alike(tmp_path / "one.csv", tmp_path / "two.csv")[1]
+    assert lines(tmp_path / "one.csv") == lines(tmp_path / "two.csv")
 
 
 def test_no_scheduler(tmp_path, monkeypatch, capfd):
-    cluster = pytest.importorskip("qh_unwrap.farm.cluster")
     pytest.importorskip("distributed")
     monkeypatch.setattr(cluster, "_AT_FIRST", 0.5)
     inputs = sheets(tmp_path / "in", "a")
@@ -346,3 +346,75 @@ def test_no_scheduler(tmp_path, monkeypatch, capfd):
 def test_summaries_fit_in_a_line_of_open_job_description(capfd):
     telling._OpenJobDescription().fail(2, "one\ntwo")
     assert capfd.readouterr().out == "openjd_fail: one two\n"
+
+
+def test_a_report_that_cannot_be_written_is_told(tmp_path, monkeypatch, capfd):
+    def fail(path, entries):
+        raise FileError(f"cannot write the report {path}: the disk is full")
+
+    monkeypatch.setattr(report, "write", fail)
+    inputs = sheets(tmp_path / "in", "a")
+    assert main([*inputs, "-O", str(tmp_path / "out"), "--report", str(tmp_path / "r.csv")]) == 1
+    printed = capfd.readouterr()
+    assert "the disk is full" in printed.err and "1 file: 1 ok" in printed.out
+
+
+def test_suffixes_are_those_that_blender_reads_and_writes():
+    assert tuple(files.READERS) == suffixes.READ and tuple(files.WRITERS) == suffixes.WRITTEN
+
+
+def test_an_entry_that_was_cut_off_counts_as_unfinished(tmp_path):
+    inputs = sheets(tmp_path / "in", "a")
+    again = [*inputs, "-O", str(tmp_path / "out"), "--resume"]
+    assert main(again) == 0
+    (entry,) = (tmp_path / "out" / ".qh-unwrap").glob("*.json")
+    entry.write_bytes(entry.read_bytes()[:40])
+    assert Ledger(tmp_path / "out").entries() == []
+    assert main(again) == 0
+    assert [each.status for each in Ledger(tmp_path / "out").entries()] == ["ok"]
+
+
+def test_what_a_power_cut_left_is_swept_away(tmp_path):
+    inputs = sheets(tmp_path / "in", "a")
+    out = tmp_path / "out"
+    out.mkdir()
+    Ledger(out).prepare()
+    Ledger(out).write(Entry(inputs[0], str(out / "a_uv.obj"), ticket="0123"))
+    for name in (".qh-unwrap-0123-x", ".qh-unwrap-4567-x"):
+        (out / name).mkdir()
+    (out / "a_uv.obj").write_text("half")
+    assert main([*inputs, "-O", str(out), "--resume"]) == 0
+    assert [path.name for path in leftovers(out)] == [".qh-unwrap-4567-x"], "that of another run"
+    assert "vt " in (out / "a_uv.obj").read_text()
+
+
+def test_what_the_scheduler_repeats_is_not_done_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "_kept", lambda: pytest.fail("a worker was asked for"))
+    ledger = Ledger(tmp_path)
+    asset = Asset(str(tmp_path / "a.obj"), str(tmp_path / "b.obj"), str(tmp_path), since=ledger.prepare())
+    ledger.write(Entry.begun(asset, status="ok"))
+    assert cluster._unwrap(asset.to_dict(), (None, None))["status"] == "ok"
+
+
+def test_files_that_two_assets_wrote_at_a_time_are_told(tmp_path):
+    ledger = Ledger(tmp_path)
+    ledger.prepare()
+    one, other = (
+        Entry("", str(tmp_path / name), status="ok", details=dict(files=[str(tmp_path / name), "t.png"]))
+        for name in "ab"
+    )
+    placed = {}
+    assert batch._checked(one, placed, tmp_path).is_good
+    found = batch._checked(other, placed, tmp_path)
+    assert found.status == "failed" and "t.png" in found.error
+    assert ledger.read(tmp_path / "b").status == "failed"
+
+
+def test_buffers_count_as_content_of_gltf_files(tmp_path):
+    path = tmp_path / "a.gltf"
+    path.write_text(json.dumps(dict(buffers=[dict(uri="a.bin"), dict(uri="data:,")])))
+    found = set()
+    for content in (b"1", b"2", b"2"):
+        (tmp_path / "a.bin").write_bytes(content)
+        found.add(digest(path))
+    assert len(found) == 2 and "" not in found
