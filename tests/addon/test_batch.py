@@ -14,10 +14,11 @@ import pytest
 from qh_unwrap.addon import files, suffixes
 from qh_unwrap.addon.failures import FileError
 from qh_unwrap.cli import main
-from qh_unwrap.farm import batch, child, cluster, naming, report, telling
+from qh_unwrap.farm import batch, child, cluster, naming, pool, report, telling
 from qh_unwrap.farm.asset import Asset
 from qh_unwrap.farm.entry import Entry
 from qh_unwrap.farm.ledger import Ledger, digest
+from qh_unwrap.farm.worker import Limits, Worker
 
 _ROOT = Path(__file__).parents[2]
 _POISONED = [sys.executable, "-P", str(Path(__file__).with_name("poisoned_worker.py"))]
@@ -51,6 +52,25 @@ def contents(folder):
 
 def leftovers(folder):
     return list(folder.rglob(".qh-unwrap-*"))
+
+
+@pytest.fixture(scope="module")
+def kept_worker():
+    worker = Worker(Limits())
+    yield worker
+    worker.end()
+
+
+@pytest.fixture
+def one_worker(kept_worker, monkeypatch):
+    """Have all runs by the same worker process, since each takes a second to start."""
+
+    class Kept:
+        is_idle = property(lambda self: kept_worker.is_idle)
+        begin, poll = kept_worker.begin, kept_worker.poll
+        stop = end = lambda self: None
+
+    monkeypatch.setattr(pool, "Worker", lambda limits: Kept())
 
 
 @pytest.fixture
@@ -148,7 +168,7 @@ def test_a_run_that_was_ended_goes_on(tmp_path, number):
     )
 
 
-def test_resume_repeats_what_changed_and_nothing_else(tmp_path, capfd):
+def test_resume_repeats_what_changed_and_nothing_else(one_worker, tmp_path, capfd):
     inputs = sheets(tmp_path / "in", *"abc")
     out = tmp_path / "out"
     again = [*inputs, "-O", str(out), "--progress", "json", "--resume"]
@@ -239,7 +259,7 @@ def test_names_of_outputs(tmp_path):
     assert naming.chosen("1-3,7,10-14:2", 20) == [0, 1, 2, 6, 9, 11, 13]
 
 
-def test_files_in_their_own_place(tmp_path):
+def test_files_in_their_own_place(one_worker, tmp_path):
     inputs = sheets(tmp_path / "in", *"ab")
     flags = ["-O", str(tmp_path / "in"), "--name", "{stem}{suffix}"]
     assert main([*inputs, *flags, "--overwrite"]) == 0
@@ -250,7 +270,7 @@ def test_files_in_their_own_place(tmp_path):
     assert all(written[Path(path)] == Path(path).read_bytes() for path in inputs)
 
 
-def test_files_that_fail_are_told_and_tried_again(tmp_path, capfd):
+def test_files_that_fail_are_told_and_tried_again(one_worker, tmp_path, capfd):
     inputs = sheets(tmp_path / "in", *"ab")
     Path(inputs[1]).write_text("nothing")
     out, table = tmp_path / "out", tmp_path / "r.csv"
@@ -264,7 +284,7 @@ def test_files_that_fail_are_told_and_tried_again(tmp_path, capfd):
     assert lines(table) == lines(tmp_path / "all.csv")
 
 
-def test_no_texture_is_replaced_by_that_of_another_file(tmp_path):
+def test_no_texture_is_replaced_by_that_of_another_file(one_worker, tmp_path):
     for name in "ab":
         (path,) = sheets(tmp_path / name, name)
         (tmp_path / name / "m.mtl").write_text("newmtl m\nmap_Kd t.png\n")
@@ -280,7 +300,7 @@ def test_no_texture_is_replaced_by_that_of_another_file(tmp_path):
     assert (tmp_path / "new" / "b" / "t.png").read_bytes() == b"b"
 
 
-def test_progress_for_programs(tmp_path, capfd):
+def test_progress_for_programs(one_worker, tmp_path, capfd):
     inputs = sheets(tmp_path / "in", *"ab")
     capfd.readouterr()
     assert main([*inputs, "-O", str(tmp_path / "out"), "--progress", "json"]) == 0
@@ -294,7 +314,7 @@ def test_progress_for_programs(tmp_path, capfd):
     assert lines[-1].startswith("openjd_fail: 2 files: 1 ok, 1 failed")
 
 
-def test_a_list_and_some_of_it(tmp_path):
+def test_a_list_and_some_of_it(one_worker, tmp_path):
     sheets(tmp_path / "in", *"abcd")
     listed = tmp_path / "list.txt"
     listed.write_text("in/a.obj\n\nin/b.obj\r\nin/c.obj\nin/d.obj\n")
@@ -348,7 +368,7 @@ def test_summaries_fit_in_a_line_of_open_job_description(capfd):
     assert capfd.readouterr().out == "openjd_fail: one two\n"
 
 
-def test_a_report_that_cannot_be_written_is_told(tmp_path, monkeypatch, capfd):
+def test_a_report_that_cannot_be_written_is_told(one_worker, tmp_path, monkeypatch, capfd):
     def fail(path, entries):
         raise FileError(f"cannot write the report {path}: the disk is full")
 
@@ -363,7 +383,7 @@ def test_suffixes_are_those_that_blender_reads_and_writes():
     assert tuple(files.READERS) == suffixes.READ and tuple(files.WRITERS) == suffixes.WRITTEN
 
 
-def test_an_entry_that_was_cut_off_counts_as_unfinished(tmp_path):
+def test_an_entry_that_was_cut_off_counts_as_unfinished(one_worker, tmp_path):
     inputs = sheets(tmp_path / "in", "a")
     again = [*inputs, "-O", str(tmp_path / "out"), "--resume"]
     assert main(again) == 0
@@ -374,7 +394,7 @@ def test_an_entry_that_was_cut_off_counts_as_unfinished(tmp_path):
     assert [each.status for each in Ledger(tmp_path / "out").entries()] == ["ok"]
 
 
-def test_what_a_power_cut_left_is_swept_away(tmp_path):
+def test_what_a_power_cut_left_is_swept_away(one_worker, tmp_path):
     inputs = sheets(tmp_path / "in", "a")
     out = tmp_path / "out"
     out.mkdir()
