@@ -96,6 +96,9 @@ def _check_free(args, output, entry):
 
 
 def _existing(folder):
+    """The folder, or the first one above it that is there."""
     while not folder.is_dir():
+        if folder.exists():
+            raise UsageError(f"{folder} is no folder: choose another --name")
         folder = folder.parent
     return folder

@@ -65,17 +65,20 @@ class _Json:
 class _OpenJobDescription:
     """The lines that a scheduler reads in what a task prints."""
 
+    _first = ""  # file that is not good
+
     def begin(self, count):
-        self._count = count
         self._show("status", f"0 of {count} files")
 
     def tell(self, entry, done, count):
         console.show(_line(entry, done, count))
+        if not (entry.is_good or self._first):
+            self._first = f"; first: {Path(entry.input).name}: {entry.error or entry.status}"
         self._show("progress", f"{100 * done / count:.1f}")
         self._show("status", f"{done} of {count} files")
 
     def end(self, exit_code, summary):
-        self._show("fail" if exit_code else "status", summary)
+        self._show("fail" if exit_code else "status", summary + self._first)
 
     def fail(self, exit_code, error):
         self._show("fail", error)

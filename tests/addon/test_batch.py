@@ -218,6 +218,7 @@ def test_resume_repeats_what_changed_and_nothing_else(one_worker, tmp_path, capf
         (["in/a.obj", "in/a_2.obj", "-O", "in", "--name", "{stem}_2{suffix}", "--overwrite"], "would replace"),
         (["in/a.obj", "-O", "out", "--name", "../{stem}{suffix}"], "leads out of the folder"),
         (["in/a.obj", "-O", "out", "--name", "/tmp/{stem}{suffix}"], "leads out of the folder"),
+        (["in/a.obj", "-O", "in", "--name", "b.obj/{stem}{suffix}"], "b.obj is no folder"),
         (["in/a.obj", "-O", "out", "--name", "{number}"], "use {stem}, {suffix}"),
         (["in/a.obj", "-O", "out", "--name", "{stem"], "use {stem}, {suffix}"),
         (["in/a.obj", "-O", "out", "-o", "b.obj"], "excludes --output"),
@@ -311,7 +312,7 @@ def test_progress_for_programs(one_worker, tmp_path, capfd):
     assert main([*inputs, "-O", str(tmp_path / "out"), "--progress", "openjd", "--resume"]) == 1
     lines = capfd.readouterr().out.splitlines()
     assert "openjd_progress: 50.0" in lines and "openjd_status: 2 of 2 files" in lines
-    assert lines[-1].startswith("openjd_fail: 2 files: 1 ok, 1 failed")
+    assert lines[-1].startswith("openjd_fail: 2 files: 1 ok, 1 failed") and "first: a.obj: " in lines[-1]
 
 
 def test_a_list_and_some_of_it(one_worker, tmp_path):
