@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .addon import stopping, streams, suffixes, writing
 from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
-from .addon.failures import FileError, UsageError
+from .addon.failures import NO_BLENDER, FileError, UsageError
 from .addon.options import MeshOptions, SeamOptions
 from .core import Settings, UnwrapError
 from .core.seam_settings import SeamSettings
@@ -60,7 +60,7 @@ def _run(args, record, progress):
         try:
             import bpy
         except ImportError:
-            raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
+            raise UsageError(NO_BLENDER) from None
         from .addon import choosing, files, jobs, patches, preview, selection
     record.blender = bpy.app.version_string
 

@@ -3,15 +3,17 @@
 
 import math
 import os
+import sys
 import time
 import traceback
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 from .. import single
 from ..addon import stopping, writing
 from ..addon.document import FAILED, OK, PARTIAL, USAGE
-from ..addon.failures import FileError, UsageError
+from ..addon.failures import NO_BLENDER, FileError, UsageError
 from . import child, cluster, plan, pool, report, telling
 from .asset import CURE
 from .ledger import Ledger
@@ -23,9 +25,8 @@ _WRITTEN = ("ok", "partial")
 def carried_out(args):
     """Do it, and tell of it; returns the exit code."""
     teller = telling.teller(args)
-    entries = {}
     try:
-        return _run(args, teller, entries)
+        return _run(args, teller)
     except UsageError as error:
         code, reason = USAGE, error
     except FileError as error:
@@ -42,18 +43,17 @@ def carried_out(args):
     return code
 
 
-def _run(args, teller, entries):
+def _run(args, teller):
     start = time.monotonic()
     _check(args)
     todo = plan.planned(args)
     reports = [Path(os.path.abspath(path)) for path in args.report or ()]
     _check_reports(reports, args, todo)
-    count = len(todo.order)
+    entries, placed, count = {}, {}, len(todo.order)
     teller.begin(count)
     for entry in todo.done:
         entries[entry.output] = entry
         teller.tell(entry, len(entries), count)
-    placed = {}
     try:
         for entry in _unwrapped(args, todo):
             entry = _checked(entry, placed, todo.folder)
@@ -104,6 +104,8 @@ def _check(args):
         raise UsageError("--dask excludes --jobs: as many files at a time are unwrapped as the cluster has threads")
     if args.dask:
         cluster.require()
+    elif "bpy" not in sys.modules and find_spec("bpy") is None:
+        raise UsageError(NO_BLENDER)
     elif args.memory and child.resident(os.getpid()) is None:
         raise UsageError("--memory needs psutil on this system: pip install 'qh-unwrap[farm]'")
     single.settings_of(args)

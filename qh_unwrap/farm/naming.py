@@ -61,6 +61,7 @@ def outputs_of(inputs, folder, pattern):
             raise UsageError(f"{path} is named twice")
         if other is not path:
             cure = "choose another --name, such as '{folder}/{stem}_uv{suffix}'"
+            cure = "rename one of them, or choose another --name" if other.parent == path.parent else cure
             raise UsageError(f"{other} and {path} would both be written to {output}: {cure}")
     _check_inputs_stay(inputs, outputs)
     return outputs
@@ -68,12 +69,11 @@ def outputs_of(inputs, folder, pattern):
 
 def _check_inputs_stay(inputs, outputs):
     """Raise `UsageError` where the output of one file would replace another one."""
-    places = {os.path.realpath(path): path for path in inputs}
+    places = {_key(os.path.realpath(path)): path for path in inputs}
     for path, output in zip(inputs, outputs, strict=True):
-        for written in filter(None, (output, suffixes.sibling(output))):
-            replaced = places.get(os.path.realpath(written))
-            if replaced and replaced != path:
-                raise UsageError(f"the output of {path} would replace {replaced}: choose another --name or folder")
+        replaced = places.get(_key(os.path.realpath(output)))
+        if replaced and _key(replaced) != _key(path):
+            raise UsageError(f"the output of {path} would replace {replaced}: choose another --name or folder")
 
 
 def _key(path):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..addon import writing
-from ..addon.failures import FileError, UsageError
+from ..addon.failures import NO_BLENDER, FileError, UsageError
 from .child import Child
 from .entry import CRASHED, TIMED_OUT, TOO_LARGE, Entry
 from .ledger import Ledger
@@ -50,7 +50,7 @@ class Worker:
         is_alive = self._child.is_alive  # asked before its last messages are read
         for message in self._child.received():
             if message.get("lacking"):
-                raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender")
+                raise UsageError(NO_BLENDER)
             if "ready" in message:
                 self._is_ready, self._since = True, time.monotonic()
             if "entry" in message:

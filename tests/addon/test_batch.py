@@ -216,6 +216,7 @@ def test_resume_repeats_what_changed_and_nothing_else(one_worker, tmp_path, capf
         (["in/a.obj", "-O", "in", "--name", "{stem}{suffix}"], "a.obj exists"),
         (["in/a.obj", "in/b.obj", "-O", "in", "--name", "{stem}_2{suffix}"], "a_2.obj exists"),
         (["in/a.obj", "in/a_2.obj", "-O", "in", "--name", "{stem}_2{suffix}", "--overwrite"], "would replace"),
+        (["in/a.obj", "in/ä.obj", "-O", "in", "--name", "{stem}̈.obj", "--overwrite"], "would replace"),
         (["in/a.obj", "-O", "out", "--name", "../{stem}{suffix}"], "leads out of the folder"),
         (["in/a.obj", "-O", "out", "--name", "/tmp/{stem}{suffix}"], "leads out of the folder"),
         (["in/a.obj", "-O", "in", "--name", "b.obj/{stem}{suffix}"], "b.obj is no folder"),
