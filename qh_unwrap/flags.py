@@ -10,6 +10,7 @@ from .addon.failures import UsageError
 from .addon.options import MeshOptions, SeamOptions
 from .addon.suffixes import SPLIT
 from .core import Settings
+from .core.relax_settings import RelaxSettings
 from .core.seam_settings import SeamSettings
 
 _DESCRIPTION = "Unwrap meshes with little distortion and without flipped faces."
@@ -27,6 +28,8 @@ examples:
       pack a second UV map of some objects, in the same file
   qh-unwrap models/*.glb -O unwrapped --jobs 4 --resume --report report.html
       many files, four at a time; after an interruption the same command goes on
+  qh-unwrap model.obj -o relaxed.obj --relax
+      keep the outlines of the UVs that there are, and even out what is in them
   qh-unwrap model.obj --boundary CIRCLE --balance 0.5 --refine 0 --preview picture.png
       look at the published map, and write nothing else
 
@@ -75,6 +78,12 @@ def parser():
     made.add_argument("--object", action="append", metavar="NAME", help="unwrap this object only; may be repeated")
     made.add_argument("--seams-from-islands", action="store_true", help="first mark the cuts of the old UVs as seams")
     made.add_argument(
+        "--relax",
+        action="store_true",
+        help="do not unwrap, but relax the UVs that there are where they lie; of all options those of relaxing count,"
+        " and --balance, --correct-aspect, --correct-scale, --use-subsurf-data and --weld",
+    )
+    made.add_argument(
         "--collection",
         action="append",
         metavar="NAME",
@@ -112,7 +121,8 @@ def parser():
     made.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     for title, kinds in _GROUPS.items():
         group = made.add_argument_group(title)
-        for field in (field for kind in kinds for field in dataclasses.fields(kind) if field.name not in _IN_CUT):
+        told = {*_IN_CUT, *(["balance"] if kinds == (RelaxSettings,) else [])}  # elsewhere
+        for field in (field for kind in kinds for field in dataclasses.fields(kind) if field.name not in told):
             action = group.add_argument(f"--{field.name.replace('_', '-')}", **_argument(field))
             action.help = _help(field).replace("%", "%%")
     return made
@@ -188,6 +198,7 @@ _GROUPS = {
     "unwrapping": (Settings,),
     "mesh and placement": (MeshOptions,),
     "new seams": (SeamSettings, SeamOptions),
+    "relaxing, with --relax": (RelaxSettings,),
 }
 _IN_CUT = ("until", "unwrap", "distortion")  # which --cut says
 

@@ -13,6 +13,7 @@ from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
 from .addon.failures import NO_BLENDER, FileError, UsageError
 from .addon.options import MeshOptions, SeamOptions
 from .core import Settings, UnwrapError
+from .core.relax_settings import RelaxSettings
 from .core.seam_settings import SeamSettings
 from .core.stepping import finished, mapped
 from .patching.original import PatchError
@@ -51,9 +52,9 @@ def _run(args, record, progress):
     record.input, record.output = str(args.input), str(args.output) if args.output else None
     record.strict = bool(args.strict)
     _check_paths(args)
-    settings, options, seam_settings, seam_options = settings_of(args)
-    values = dataclasses.asdict(settings) | dataclasses.asdict(options)
-    if options.cut != 'NEVER':
+    settings, options, seam_settings, seam_options, relax_settings = settings_of(args)
+    values = dataclasses.asdict(relax_settings if args.relax else settings) | dataclasses.asdict(options)
+    if options.cut != 'NEVER' and not args.relax:
         values |= dataclasses.asdict(seam_settings) | dict(vertex_group=seam_options.vertex_group)
     record.settings = {name: getattr(value, "item", lambda value=value: value)() for name, value in values.items()}
     with stopping.undisturbed(), streams.quiet():
@@ -91,7 +92,10 @@ def _run(args, record, progress):
             progress(share)
 
     with streams.quiet():
-        steps = jobs.cut_and_unwrap(targets, settings, options, bpy.context, seam_settings, seam_options)
+        if args.relax:
+            steps = jobs.relax(targets, relax_settings, options, bpy.context)
+        else:
+            steps = jobs.cut_and_unwrap(targets, settings, options, bpy.context, seam_settings, seam_options)
         outcomes, cuts = finished(mapped(step, steps))
     record.cuts = [cut.to_dict() for cut in cuts if cut.new.any()]
     record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
@@ -108,7 +112,8 @@ def _write(args, record, maps, targets, options, patch):
     done = {target.obj for target in targets if target.obj.name in named}
 
     def draw(path):
-        preview.render(targets, record.outcomes, options, path)
+        # Regions that are relaxed have other numbers than islands.
+        preview.render(targets, [] if args.relax else record.outcomes, options, path)
 
     with writing.Staging(overwrite=args.overwrite) as staging:
         if args.preview:
@@ -182,12 +187,14 @@ def _reason(error):
 
 
 def settings_of(args):
-    """The `Settings`, `MeshOptions`, `SeamSettings` and `SeamOptions` of the flags; raises `UsageError`."""
+    """The `Settings`, `MeshOptions`, `SeamSettings`, `SeamOptions` and `RelaxSettings` of the flags; raises
+    `UsageError`."""
     given = vars(args) | args.cut
     if args.weld is None:
         given["weld"] = str(args.input).lower().endswith(suffixes.SPLIT)
     try:
-        made = [_made_from(given, kind) for kind in (Settings, MeshOptions, SeamSettings, SeamOptions)]
+        kinds = Settings, MeshOptions, SeamSettings, SeamOptions, RelaxSettings
+        made = [_made_from(given, kind) for kind in kinds]
         made[0].check_together()
     except UnwrapError as error:
         raise UsageError(error) from None

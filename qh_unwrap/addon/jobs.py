@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All that is done to faces in one go, for the operators and the command line: cut, unwrap, or both."""
+"""All that is done to faces in one go, for the operators and the command line: cut, unwrap, or both; relax."""
 
 from ..core.stepping import mapped
-from . import cutting, mesh_arrays, modes
+from . import cutting, mesh_arrays, modes, relaxing, uv_selection
 from .unwrapping import unwrap_targets
 
 _CUTTING = {'NEVER': 0.0, 'NEEDED': 0.1, 'DISTORTION': 0.7}  # the part of the work, by and large
@@ -31,3 +31,10 @@ def cut(targets, settings, options, context, seam_settings, seam_options):
             if each.new.any():
                 mesh_arrays.mark_seams(each.target.obj, each.new)
     return [], cuts
+
+
+def relax(targets, settings, options, context):
+    """Relax the targets' faces where they lie, in Object Mode: the outcomes of their regions, and no cuts."""
+    chosen = [(target.obj, uv_selection.of_faces(target.obj, target.faces)) for target in targets]
+    outcomes = yield from relaxing.relax(chosen, settings, options, context)
+    return outcomes, []

@@ -6,7 +6,7 @@ import dataclasses
 import bpy
 
 from ..core.errors import SettingsError
-from . import jobs, properties, relaxing, selection, telling
+from . import jobs, properties, relaxing, selection, telling, uv_selection
 from .outcome import latest
 from .running import InSteps
 
@@ -104,7 +104,8 @@ class _OnSelectedUVs(_OnSelectedFaces):
 
     def begin(self, context):
         options = context.scene.qh_unwrap.mesh_options()
-        return self.work(selection.mesh_objects(context), self.settings(), options, context)
+        chosen = [(obj, uv_selection.read(obj, context)) for obj in selection.mesh_objects(context)]
+        return self.work(chosen, self.settings(), options, context)
 
     def finish(self, outcomes):
         if not outcomes:

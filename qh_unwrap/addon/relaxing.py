@@ -11,11 +11,12 @@ from ..core.regions import Connected, Selection
 from ..core.relaxing import relax_islands, rim, straighten_islands
 from ..core.stepping import mapped
 from ..core.straightening import Polygons, rectangle, straight_lines
-from . import judging, mesh_arrays, modes, stacking, uv_selection
+from . import judging, mesh_arrays, modes, stacking
 from .last_run import last_run
 from .outcome import Outcome
 from .selection import Target
 from .unwrapping import are_as_read, keep, write
+from .uv_selection import UVSelection
 from .work import Work
 
 _RELAXING = 0.9  # of all the work, by and large; the rest is to see what lies on what
@@ -25,36 +26,36 @@ NO_ROOM = "nothing that is selected can move: select more, unpin some, or let ou
 STAYS = "its outline stays as it is: it would run over other islands"
 
 
-def relax(objects, settings, options, context):
-    """Relax what is selected in the objects' UV maps, in Object Mode all that is visible.
+def relax(chosen, settings, options, context):
+    """Relax what is selected in UV maps; `chosen` are pairs of objects and `UVSelection`s.
 
     A generator: yields the share that is done, returns the outcomes of the regions that were selected; there are none
     where nothing is selected.  Nothing is written before all are done.
     """
     works = []
-    for obj in objects:
+    for obj, selected in chosen:
         yield 0.0
-        works += _regions(obj, settings, options, context)
+        works += _regions(obj, selected, settings, options)
     return (yield from _carried_out(works, _relaxed, settings, options, context))
 
 
-def straighten(objects, settings, options, context):
-    """Straighten what is selected in the objects' UV maps, and relax the rest of its islands around it.
+def straighten(chosen, settings, options, context):
+    """Straighten what is selected in UV maps, and relax the rest of its islands around it.
 
     A generator like `relax`; the outcomes are those of whole islands.
     """
     works = []
-    for obj in objects:
+    for obj, selected in chosen:
         yield 0.0
-        works += _straight(obj, settings, options, context)
+        works += _straight(obj, selected, settings, options)
     return (yield from _carried_out(works, _straightened, settings, options, context))
 
 
-def _regions(obj, settings, options, context):
+def _regions(obj, selected, settings, options):
     """The works of an object: regions whose UVs move, or what stands in the way."""
-    mesh, selected = mesh_arrays.read(obj, options), uv_selection.read(obj, context)
     if not selected.corners.any():
         return
+    mesh = mesh_arrays.read(obj, options)
     if mesh.uv is None:
         yield _refused(obj, mesh, selected.faces, NO_MAP)
         return
@@ -66,9 +67,9 @@ def _regions(obj, settings, options, context):
     yield from _works(obj, mesh, connected, connected.faces_with(moving), moving)
 
 
-def _straight(obj, settings, options, context):
+def _straight(obj, selected, settings, options):
     """The same of whole islands, with what is to be straight in them."""
-    mesh, selected = mesh_arrays.read(obj, options), uv_selection.read(obj, context)
+    mesh = mesh_arrays.read(obj, options)
     is_rectangle = settings.shape == 'RECTANGLE'
     sides = selected.faces[mesh.corner_faces] if is_rectangle else selected.sides
     if not sides.any():
@@ -76,7 +77,7 @@ def _straight(obj, settings, options, context):
     if mesh.uv is None:
         yield _refused(obj, mesh, selected.faces, NO_MAP)
         return
-    everything = uv_selection.UVSelection(*(np.ones_like(each) for each in selected))
+    everything = UVSelection(*(np.ones_like(each) for each in selected))
     connected = _connected(mesh, everything)
     moving = connected.moving(settings.move_outline) & ~connected.spread(mesh.pinned)
     chosen = np.zeros(len(mesh.face_start), dtype=bool)

@@ -21,11 +21,7 @@ class UVSelection(NamedTuple):
 def read(obj, context):
     """What is selected of an object's mesh; in Object Mode all that is visible."""
     if obj.mode != 'EDIT':
-        faces = visible_faces(obj.data)
-        sizes = np.zeros(len(faces), dtype=np.int32)
-        obj.data.polygons.foreach_get("loop_total", sizes)
-        corners = np.repeat(faces, sizes)
-        return UVSelection(faces, corners, corners.copy())
+        return of_faces(obj, visible_faces(obj.data))
     bm = bmesh.from_edit_mesh(obj.data)
     face, corner, side = _rules(bm, context)
     faces = [not each.hide and face(each) for each in bm.faces]
@@ -33,6 +29,14 @@ def read(obj, context):
     corners = [not hidden and corner(loop) for loop, hidden in loops]
     sides = [not hidden and side(loop) for loop, hidden in loops]
     return UVSelection(*(np.array(each, dtype=bool) for each in (faces, corners, sides)))
+
+
+def of_faces(obj, faces):
+    """The same as if these faces (f,) bool were selected; not in Edit Mode."""
+    sizes = np.zeros(len(faces), dtype=np.int32)
+    obj.data.polygons.foreach_get("loop_total", sizes)
+    corners = np.repeat(faces, sizes)
+    return UVSelection(faces, corners, corners.copy())
 
 
 def _rules(bm, context):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scenes import FIVE, add_grid, changes, edit_mode, mesh_object, select_uvs, snapshot, uvs
 
+import qh_unwrap
 from qh_unwrap.addon import operators
 
 
@@ -513,3 +514,35 @@ def test_selected_edges_of_the_uv_editor(uv_editor):
         assert straighten() == {'FINISHED'}
     settings.uv_select_mode = 'VERTEX'
     assert len(np.unique(at_vertex(obj)[3, :, 1])) == 1
+
+
+@pytest.mark.parametrize("suffix", [".blend", ".obj"])
+def test_files_are_relaxed(tmp_path, suffix):
+    obj = spoilt_grid()
+    old, outline = uvs(obj), ((uvs(obj) == 0) | (uvs(obj) == 1)).any(axis=1)
+    path, output = tmp_path / f"in{suffix}", tmp_path / f"out{suffix}"
+    if suffix == ".blend":
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    else:
+        bpy.ops.wm.obj_export(filepath=str(path))
+    report = qh_unwrap.unwrap_file(path, output, relax=True, overwrite=True)
+    assert report["exit_code"] == 0 and report["totals"]["certified"] == 1 and not report["cuts"]
+    assert report["settings"]["steps"] == 30 and "boundary" not in report["settings"]
+    (island,) = report["islands"]
+    assert island["after"]["symmetric_dirichlet"] < island["before"]["symmetric_dirichlet"]
+    if suffix == ".blend":
+        bpy.ops.wm.open_mainfile(filepath=str(output))
+    else:
+        bpy.ops.wm.read_homefile(use_empty=True)
+        bpy.ops.wm.obj_import(filepath=str(output))
+    new = uvs(bpy.data.objects[0])
+    tolerance = 0 if suffix == ".blend" else 1e-5  # digits of the exporter
+    assert np.abs(old[outline] - new[outline]).max() <= tolerance and moved(old, new).any()
+
+
+def test_a_file_without_uvs_cannot_be_relaxed(tmp_path):
+    add_grid(uv=False)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"))
+    report = qh_unwrap.unwrap_file(tmp_path / "in.blend", tmp_path / "out.blend", relax=True)
+    assert report["exit_code"] == 3 and "has no UV map" in report["islands"][0]["error"]
+    assert not (tmp_path / "out.blend").exists()
