@@ -25,7 +25,8 @@ class Selection(NamedTuple):
 class Connected:
     """How the faces of a mesh hang together in its UV map.
 
-    Faces on top of others with the same corners and the same UVs go along with these; those with other UVs stay.
+    Selected faces on top of others with the same corners and the same UVs go along with these; those with other UVs
+    stay.
 
     Parameters
     ----------
@@ -72,12 +73,13 @@ class Connected:
         """The corners whose UVs may move, (c,) bool.
 
         A UV vertex does if it is selected in all faces around it, and does not lie on the border between selected and
-        unselected faces, nor, unless the `outline_moves`, on the outline of its island.
+        unselected faces, nor, unless the `outline_moves`, on the outline of its island.  Where no face around it is
+        selected, it never does on an outline: across a seam, the same vertex of the mesh is selected as well.
         """
         in_selected = self._selection.faces[self.corner_face]
-        still = self._at_vertices(~self._selection.corners)
-        still |= self._at_vertices(in_selected) & self._at_vertices(~in_selected)
-        still |= self._pinched if outline_moves else self.outline
+        beside, apart = self._at_vertices(in_selected), self._at_vertices(~in_selected)
+        still = self._at_vertices(~self._selection.corners) | (beside & apart)
+        still |= self._pinched | (self.outline & ~beside) if outline_moves else self.outline
         return ~still[self.uv_vertex] & self._single
 
     def spread(self, corners: np.ndarray) -> np.ndarray:
@@ -124,5 +126,5 @@ class Connected:
     def islands(self, faces: np.ndarray, corner_triangles: np.ndarray) -> list[Island]:
         """The islands that the chosen faces (f,) bool make, with those on top of them that go along."""
         faces, doubles = faces.copy(), self._doubles
-        faces[doubles.faces] = faces[doubles.twin_faces]
+        faces[doubles.faces] = faces[doubles.twin_faces] & self._selection.faces[doubles.faces]
         return find_islands(*self._mesh, ~self.joined, faces & ~self.set_aside, corner_triangles)

@@ -15,7 +15,7 @@ from .certificate import certified_pieces, orientation
 from .chart import Surface, numbered_edges
 from .distortion import measure
 from .energy import energies
-from .errors import BorderError, UnwrapError, UVError
+from .errors import BorderError, ClosedError, GenusError, UnwrapError, UVError
 from .placing import in_place, is_mirrored, says_where
 from .relax_settings import RelaxSettings, StraightenSettings
 from .report import Result, Shape
@@ -130,7 +130,7 @@ def _flips(triangles, uv):
 
 
 def _counted(flips):
-    return f"{flips} of its triangles {'is' if flips == 1 else 'are'} flipped or have no area"
+    return f"{flips} of its triangles {'is flipped or has' if flips == 1 else 'are flipped or have'} no area"
 
 
 def _unwrapped(tasks, triangulate):
@@ -147,8 +147,17 @@ def _unwrapped(tasks, triangulate):
         found = yield from mapped(lambda share, first=first, part=part: first + part * share, steps)
         done += len(group)
         for k, result in zip(group, found, strict=True):
-            results[k] = UVError(f"{result.fault}: {_CURE}") if isinstance(result, BorderError) else result
+            results[k] = _explained(result)
     return results
+
+
+def _explained(result):
+    """The result, or its error with a cure that helps here."""
+    if isinstance(result, BorderError):
+        return UVError(f"{result.fault}: {_CURE}")
+    if isinstance(result, ClosedError | GenusError):
+        return UVError("its UVs are not cut open anywhere, as a model's have to be: mark seams, and unwrap it first")
+    return result
 
 
 _CURE = "select all of its island, and let its outline move"

@@ -16,6 +16,7 @@ from .certificate import wrong_pieces
 from .descent import descended
 from .domain import Domain
 from .energy import Barrier, map_scale
+from .errors import SingularError
 from .triangles import hat_gradients
 
 _STEPS = 150  # at most
@@ -45,7 +46,16 @@ def untangled(
         energy = _Bent(domain, start if before is None else before, size, bent)
         jacobian = energy.jacobian(uv)
         value = energy.value(jacobian)
-        uv, now, moved = descended(domain, energy, uv, jacobian, value, going)
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                after, now, moved = descended(domain, energy, uv, jacobian, value, going)
+        except SingularError:
+            if len(sound) > 1:  # whose fault it is comes out where each is alone
+                raise
+            break
+        if not np.isfinite(after).all():
+            break
+        uv = after
         sound |= going & ~wrong_pieces(domain.charts, uv)
         since += 1
         stalled = ~moved | (value - now < _STALLED * value) | (since > _AT_ONCE)

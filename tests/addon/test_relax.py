@@ -225,6 +225,19 @@ def test_the_outline_moves_if_it_may_and_the_island_keeps_its_place_and_size():
     assert np.isclose(np.prod(np.ptp(new, axis=0)), np.prod(np.ptp(old, axis=0)), rtol=0.1)
 
 
+def test_what_a_seam_parts_from_the_selection_stays():
+    """In the mesh its vertices are selected, too."""
+    obj = spoilt_grid()
+    values = uvs(obj)
+    right = np.repeat([face % 6 >= 3 for face in range(36)], 4)
+    values[right] += (1, 0)
+    obj.data.uv_layers.active.uv.foreach_set("vector", values.ravel())
+    edit_mode(lambda _, face: face % 6 < 3)
+    old = uvs(obj)
+    assert relax(move_outline=True) == {'FINISHED'}
+    assert moved(old, uvs(obj)).tolist() == (~right).tolist()
+
+
 def with_neighbours(*boxes):
     """A flat grid that fills (0, 0) to (1, 0.2), joined with quads that fill the `boxes` (left, bottom, right, top) of
     the UV map, and with the grid's faces selected."""
