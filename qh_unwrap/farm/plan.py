@@ -38,7 +38,7 @@ def planned(args):
     options = {name: value for name, value in vars(args).items() if name not in flags.BATCH}
     settings = digest_of([__version__, {name: options[name] for name in options if name not in _IRRELEVANT}])
     options = {name: value for name, value in options.items() if name not in ("input", "output", "json", "preview")}
-    numbers = naming.chosen(args.only, len(inputs)) if args.only else range(len(inputs))
+    numbers = naming.chosen(args.only, len(inputs)) if args.only is not None else range(len(inputs))
     ledger = Ledger(folder)
     assets, done, stale = [], [], []
     for number in numbers:
