@@ -2,6 +2,7 @@
 """The plan of a batch: the assets, and which of them are done already.  All that is refused is refused here."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -45,7 +46,7 @@ def planned(args):
         path, output = inputs[number], outputs[number]
         entry = ledger.read(output) if args.resume or args.overwrite else None
         if args.resume and entry and _is_done(entry, path, output, settings):
-            done.append(entry)
+            done.append(replace(entry, input=str(path), output=str(output)))  # which may have been seen elsewhere
             continue
         _check_free(args, output, entry)
         if entry and entry.is_unfinished and entry.ticket:

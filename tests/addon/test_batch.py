@@ -100,7 +100,7 @@ def test_poison_costs_its_own_file_alone(tmp_path, poison):
     names = ["a", "crash", "b", "hang", "c", "eat", "d", "once", "e"]
     inputs = sheets(tmp_path / "in", *names)
     out, table = tmp_path / "out", tmp_path / "r.csv"
-    limits = ["--timeout", "3", "--memory", "1"]
+    limits = ["--timeout", "5", "--memory", "1"]
     assert main([*inputs, "-O", str(out), "--jobs", "2", *limits, "--report", str(table)]) == 1
     found = rows(table)
     assert {name: row["status"] for name, row in found.items()} == dict.fromkeys("abcde", "ok") | dict(
@@ -394,6 +394,18 @@ def test_an_entry_that_was_cut_off_counts_as_unfinished(one_worker, tmp_path):
     assert Ledger(tmp_path / "out").entries() == []
     assert main(again) == 0
     assert [each.status for each in Ledger(tmp_path / "out").entries()] == ["ok"]
+
+
+def test_what_was_done_is_done_wherever_the_folder_is(one_worker, tmp_path):
+    inputs = sheets(tmp_path / "in", *"ab")
+    assert main([*inputs, "-O", str(tmp_path / "out")]) == 0
+    (tmp_path / "moved").symlink_to(tmp_path / "out")
+    entry = Ledger(tmp_path / "moved").read(tmp_path / "moved" / "a_uv.obj")
+    assert entry == Ledger(tmp_path / "out").read(tmp_path / "out" / "a_uv.obj")
+    table, before = tmp_path / "r.csv", contents(tmp_path / "out")
+    assert main([*inputs, "-O", str(tmp_path / "moved"), "--resume", "--report", str(table)]) == 0
+    assert rows(table)["a"]["output"] == str(tmp_path / "moved" / "a_uv.obj")
+    assert contents(tmp_path / "out") == before
 
 
 def test_what_a_power_cut_left_is_swept_away(one_worker, tmp_path):
