@@ -13,6 +13,8 @@ from ..core.cuttable import Polygons
 from ..core.edge_costs import Wishes
 from ..core.pieces import around_faces
 from ..core.welding import find_welds
+from . import bulk
+from .bulk import corner_edges, corner_triangles, corner_vertices
 from .options import MeshOptions
 from .shown_shape import shown_vertices
 
@@ -119,12 +121,12 @@ def _read(obj, mesh, uv_name, options, vertex_group):
         uv = uvs(mesh, uv_name).astype(np.float64)
         pins = mesh.attributes.get(f".pn.{uv_name}")  # in Blender 4, asking the layer for its pins would make this
         if pins is not None:
-            pinned = _get(pins.data, "value", bool)
+            pinned = bulk.values(pins.data, "value", bool)
     slot, images, aspects = _images(obj, mesh)
-    corner_vertex = _of_corners(mesh, ".corner_vert", "vertex_index")
-    corner_edge = _of_corners(mesh, ".corner_edge", "edge_index")
-    face_start = _get(mesh.polygons, "loop_start", np.int32)
-    seam, welded_edge = _get(mesh.edges, "use_seam", bool), None
+    corner_vertex = corner_vertices(mesh)
+    corner_edge = corner_edges(mesh)
+    face_start = bulk.values(mesh.polygons, "loop_start", np.int32)
+    seam, welded_edge = bulk.values(mesh.edges, "use_seam", bool), None
     if options.weld:
         unsmoothed = shown_vertices(obj, mesh, False) if options.use_subsurf_data else vertices
         welds = find_welds(_shapes(obj, unsmoothed), corner_vertex, corner_edge, face_start, len(seam))
@@ -137,7 +139,7 @@ def _read(obj, mesh, uv_name, options, vertex_group):
         corner_edge=corner_edge,
         face_start=face_start,
         seam=seam,
-        corner_triangles=_corner_triangles(mesh),
+        corner_triangles=corner_triangles(mesh),
         uv=uv,
         pinned=pinned,
         aspect=aspects[slot] if options.correct_aspect else np.ones(len(mesh.polygons)),
@@ -150,8 +152,8 @@ def _read(obj, mesh, uv_name, options, vertex_group):
 
 def _wishes(obj, mesh, vertex_group, corner_edge, face_start):
     """Sharp edges and borders of materials are marked, and the vertices of the group are spared by their weights."""
-    marked = _get(mesh.edges, "use_edge_sharp", bool)
-    material = _get(mesh.polygons, "material_index", np.int32)[around_faces(face_start, len(corner_edge))[0]]
+    marked = bulk.values(mesh.edges, "use_edge_sharp", bool)
+    material = bulk.values(mesh.polygons, "material_index", np.int32)[around_faces(face_start, len(corner_edge))[0]]
     lowest, highest = np.full(len(marked), np.iinfo(np.int32).max), np.full(len(marked), -1)
     np.minimum.at(lowest, corner_edge, material)
     np.maximum.at(highest, corner_edge, material)
@@ -173,7 +175,7 @@ def _weights(obj, mesh, name):
 
 def uvs(mesh, name):
     """(c, 2) float32 the UVs of the map with this name."""
-    return _get(mesh.uv_layers[name].uv, "vector", np.float32, 2)
+    return bulk.values(mesh.uv_layers[name].uv, "vector", np.float32, 2)
 
 
 def _shapes(obj, shown):
@@ -184,27 +186,16 @@ def _shapes(obj, shown):
     """
     keys = obj.data.shape_keys
     for key in keys.key_blocks if keys else ():
-        yield _get(key.data, "co", np.float32, 3)
+        yield bulk.values(key.data, "co", np.float32, 3)
     yield shown
 
 
-def _get(collection, name, dtype, width=1):
-    values = np.empty(len(collection) * width, dtype=dtype)
-    collection.foreach_get(name, values)
-    return values.reshape(-1, width) if width > 1 else values
-
-
-def _of_corners(mesh, attribute, name):
-    """The corners' vertices or edges: read as an attribute they are copied in one go, by their name one by one."""
-    values = mesh.attributes.get(attribute)
-    return _get(mesh.loops, name, np.int32) if values is None else _get(values.data, "value", np.int32)
-
-
-def _corner_triangles(mesh):
-    if len(mesh.loops) == 3 * len(mesh.polygons):
-        return np.arange(len(mesh.loops), dtype=np.int32).reshape(-1, 3)
-    mesh.calc_loop_triangles()
-    return _get(mesh.loop_triangles, "loops", np.int32, 3)
+def materials_on(obj, mesh):
+    """The object's materials, [None] for none, and the number of each face's among them, (f,)."""
+    materials = [slot.material for slot in obj.material_slots] or [None]
+    if len(materials) == 1:
+        return materials, np.zeros(len(mesh.polygons), dtype=np.int32)
+    return materials, np.minimum(bulk.values(mesh.polygons, "material_index", np.int32), len(materials) - 1)
 
 
 def _images(obj, mesh):
@@ -213,8 +204,8 @@ def _images(obj, mesh):
     What has the same image shares its UVs; without an image, what has the same material, which may get one later; and
     without a material, what is one object.
     """
-    materials = [slot.material for slot in obj.material_slots] or [None]
-    images = [_image(material) for material in materials]
+    materials, slot = materials_on(obj, mesh)
+    images = [image_of(material) for material in materials]
     names = tuple(
         f"image {image.name_full}"
         if image
@@ -223,14 +214,10 @@ def _images(obj, mesh):
         else f"object {obj.name_full}"
         for image, material in zip(images, materials, strict=True)
     )
-    if len(materials) == 1:
-        slot = np.zeros(len(mesh.polygons), dtype=np.int32)
-    else:
-        slot = np.minimum(_get(mesh.polygons, "material_index", np.int32), len(materials) - 1)
     return slot, names, np.array([_aspect(image) for image in images])
 
 
-def _image(material):
+def image_of(material):
     """The image that Blender shows for the material in the viewport, None if there is none."""
     nodes = material.node_tree.nodes if material and material.use_nodes and material.node_tree else ()
     nodes = [node for node in nodes if node.type == 'TEX_IMAGE' and node.image and min(node.image.size) > 0]
@@ -251,7 +238,7 @@ def write(obj, corners, uv):
     layer = _active_or_new_map(mesh)
     if layer is None:
         raise UnwrapError("Blender could not add a UV map: remove one of the mesh's UV maps or attributes")
-    values = _get(layer.uv, "vector", np.float32, 2)
+    values = bulk.values(layer.uv, "vector", np.float32, 2)
     values[corners] = uv
     if bpy.app.version >= (5, 0, 0):  # where `mesh.attributes` would spoil the selection of UVs
         layer.uv.foreach_set("vector", values.ravel())
@@ -262,12 +249,12 @@ def write(obj, corners, uv):
 
 def edge_vertices(obj):
     """(e, 2) the vertices of the object's edges; not in Edit Mode."""
-    return _get(obj.data.edges, "vertices", np.int32, 2)
+    return bulk.values(obj.data.edges, "vertices", np.int32, 2)
 
 
 def mark_seams(obj, edges):
     """Mark the edges (e,) bool as seams; call it within `modes.in_object_mode`."""
-    seam = _get(obj.data.edges, "use_seam", bool)
+    seam = bulk.values(obj.data.edges, "use_seam", bool)
     obj.data.edges.foreach_set("use_seam", seam | edges)
     obj.data.update()
 
