@@ -2,15 +2,17 @@
 """How a map distorts a surface, area-weighted on the surface and independent of the map's overall scale."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .certificate import orientation
-from .chart import Surface
-from .errors import UVError
+from .chart import Chart, Surface
+from .errors import ShapeError, UVError
+from .pieces import starts_of_numbers
 from .tensor import squared_stretches
-from .triangles import by_parts
+from .triangles import areas_of, by_parts, laid_flat, signed_areas
 
 _PER_TRIANGLE = {"per_triangle": True}  # marks the fields that are arrays (m,)
 
@@ -47,23 +49,75 @@ def measure(surface: Surface, uv: np.ndarray) -> Distortion:
     return measure_pieces(surface, uv)[0]
 
 
-def measure_pieces(surface: Surface, uv: np.ndarray) -> list[Distortion]:
+def measure_pieces(chart: Chart, uv: np.ndarray) -> list[Distortion]:
     """The `Distortion` of every piece's map."""
-    larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
-    share = surface.measure / surface.sums(surface.measure)[surface.piece]
+    larger, smaller, *_ = squared_stretches(chart, uv, smallest=1e-100)
+    total = chart.sums(chart.measure)
+    share = chart.measure / np.where(total > 0, total, 1)[chart.piece]
     squared, dirichlet, angle, log_area = by_parts(_measures, larger, smaller)
-    sign = orientation(uv, surface.triangles)
-    sign[(sign == 0) & surface.degenerate] = 1
+    sign = orientation(uv, chart.triangles)
+    sign[(sign == 0) & (chart.measure == 0)] = 1
     numbers = (
-        np.sqrt(surface.sums(share * squared)).tolist(),
-        surface.sums(share * dirichlet).tolist(),
-        surface.sums(share * angle).tolist(),
-        np.sqrt(surface.sums(share * log_area**2)).tolist(),
-        surface.sums((sign < 0).astype(int)).tolist(),
-        surface.sums((sign == 0).astype(int)).tolist(),
+        np.sqrt(chart.sums(share * squared)).tolist(),
+        chart.sums(share * dirichlet).tolist(),
+        chart.sums(share * angle).tolist(),
+        np.sqrt(chart.sums(share * log_area**2)).tolist(),
+        chart.sums((sign < 0).astype(int)).tolist(),
+        chart.sums((sign == 0).astype(int)).tolist(),
     )
-    arrays = (np.split(each, surface.triangle_starts[1:]) for each in (np.sqrt(squared), angle, log_area, sign))
+    ends = [*starts_of_numbers(chart.piece, chart.piece_count).tolist(), len(sign)]
+    fields = np.sqrt(squared), angle, log_area, sign
+    arrays = ([field[start:end] for start, end in pairwise(ends)] for field in fields)
     return [Distortion(*values) for values in zip(*numbers, *arrays, strict=True)]
+
+
+def measure_corners(
+    points: np.ndarray, uv: np.ndarray, island: np.ndarray | None = None
+) -> tuple[list[Distortion], np.ndarray]:
+    """The `Distortion` of every island of any UVs, valid or not, and which islands are mirrored, (k,) bool.
+
+    points  (m, 3, 3), the corners of triangles in space, any unit
+    uv      (m, 3, 2), those in the map; triangles need not hang together, and each may have UVs of its own
+    island  (m,), the island of each triangle, ascending from 0 without gaps; by default all are one
+
+    A triangle is flipped if it lies against most of the area of its island.  Raises `UVError` for UVs that are no
+    numbers, `ShapeError` for arrays that do not fit.
+    """
+    points, uv = np.asarray(points, dtype=np.float64), np.asarray(uv, dtype=np.float64)
+    if not len(uv) or points.shape != (len(uv), 3, 3) or uv.shape[1:] != (3, 2):
+        raise ShapeError(f"there must be corners (m, 3, 3) and UVs (m, 3, 2), not {points.shape} and {uv.shape}")
+    checked_uv(3 * len(uv), uv.reshape(-1, 2))
+    chart = loose_triangles(points, np.zeros(len(uv), dtype=int) if island is None else np.asarray(island))
+    mirrored = chart.sums(signed_areas(uv)) < 0
+    seen = np.where(mirrored[chart.piece, None, None], (-1, 1), 1) * uv
+    return measure_pieces(chart, seen.reshape(-1, 2)), mirrored
+
+
+def loose_triangles(points: np.ndarray, island: np.ndarray) -> Chart:
+    """Triangles (m, 3, 3) in space as a chart that knows no neighbours: corner c of triangle t is the vertex 3 t + c.
+
+    `island` (m,) ascends; every island counts as if its area were 1.
+    """
+    starts = starts_of_numbers(island, int(island[-1]) + 1)
+
+    def sums(values):
+        return np.add.reduceat(values, starts, axis=0)
+
+    middle = sums(points.mean(axis=1)) / sums(np.ones(len(points)))[:, None]
+    centred = points - middle[island, None]
+    extent = np.maximum.reduceat(np.abs(centred).max(axis=(1, 2)), starts)
+    centred /= np.where(extent > 0, extent, 1)[island, None, None]
+    area = sums(areas_of(centred))
+    centred /= np.sqrt(np.where(area > _NOTHING, area, 1))[island, None, None]
+    triangles = np.arange(3 * len(points)).reshape(-1, 3)
+    size = np.sqrt(len(starts) / len(points))
+    rest, degenerate = laid_flat(centred.reshape(-1, 3), triangles, size)
+    measure = np.where(degenerate | (area <= _NOTHING)[island], 0.0, signed_areas(rest))
+    nobody = np.zeros((0, 2), dtype=int)
+    return Chart(triangles, nobody, nobody, rest, measure, measure, island, len(starts))
+
+
+_NOTHING = 1e-14  # of the square of its extent, the area up to which an island has none
 
 
 def _measures(larger, smaller):

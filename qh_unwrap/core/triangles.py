@@ -83,10 +83,15 @@ def normals(corners: np.ndarray) -> np.ndarray:
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]).T
 
 
+def areas_of(corners: np.ndarray) -> np.ndarray:
+    """Areas (m,) of triangles in space (m, 3, 3)."""
+    return 0.5 * np.linalg.norm(normals(corners), axis=1)
+
+
 def areas_in_space(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Areas (m,) of triangles (m, 3) with points (n, 3)."""
     points = np.asfortranarray(points)
-    return by_parts(lambda part: 0.5 * np.linalg.norm(normals(corners_of(points, part.T)), axis=1), triangles.T)
+    return by_parts(lambda part: areas_of(corners_of(points, part.T)), triangles.T)
 
 
 def laid_flat(points: np.ndarray, triangles: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
