@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import bmesh
 import bpy
@@ -19,6 +20,13 @@ from .options import MeshOptions
 from .shown_shape import shown_vertices
 
 
+class Picture(NamedTuple):
+    """What counts of an image."""
+
+    pixels: int  # width times height
+    tiles: frozenset[int]  # the numbers of its tiles, 1001 for one that has none
+
+
 @dataclass(frozen=True)
 class MeshArrays:
     vertices: np.ndarray  # (n, 3) float64, as the object shows them, but for its location
@@ -33,6 +41,7 @@ class MeshArrays:
     aspect: np.ndarray  # (f,) width by height of the image on each face
     slot: np.ndarray  # (f,) the number of each face's material among the images
     images: tuple[str, ...]  # what each of the materials shows, the same for what shares its UVs
+    pictures: tuple["Picture | None", ...]  # the image itself of each material, None for those without one
     welded_edge: np.ndarray | None = None  # (e,) the edge that each counts as, None if nothing shall be welded
     wishes: Wishes | None = None  # where seams are welcome, if somebody asks
 
@@ -122,7 +131,7 @@ def _read(obj, mesh, uv_name, options, vertex_group):
         pins = mesh.attributes.get(f".pn.{uv_name}")  # in Blender 4, asking the layer for its pins would make this
         if pins is not None:
             pinned = bulk.values(pins.data, "value", bool)
-    slot, images, aspects = _images(obj, mesh)
+    slot, images, aspects, pictures = _images(obj, mesh)
     corner_vertex = corner_vertices(mesh)
     corner_edge = corner_edges(mesh)
     face_start = bulk.values(mesh.polygons, "loop_start", np.int32)
@@ -145,6 +154,7 @@ def _read(obj, mesh, uv_name, options, vertex_group):
         aspect=aspects[slot] if options.correct_aspect else np.ones(len(mesh.polygons)),
         slot=slot,
         images=images,
+        pictures=pictures,
         welded_edge=welded_edge,
         wishes=None if vertex_group is None else _wishes(obj, mesh, vertex_group, corner_edge, face_start),
     )
@@ -199,7 +209,8 @@ def materials_on(obj, mesh):
 
 
 def _images(obj, mesh):
-    """The number of each face's material, (f,), what these materials show, and the aspects of that, (m,).
+    """The number of each face's material, (f,), what these materials show, the aspects of that, (m,), and their
+    images.
 
     What has the same image shares its UVs; without an image, what has the same material, which may get one later; and
     without a material, what is one object.
@@ -214,7 +225,8 @@ def _images(obj, mesh):
         else f"object {obj.name_full}"
         for image, material in zip(images, materials, strict=True)
     )
-    return slot, names, np.array([_aspect(image) for image in images])
+    aspects = np.array([_aspect(image) for image in images])
+    return slot, names, aspects, tuple(_picture(image) for image in images)
 
 
 def image_of(material):
@@ -222,6 +234,13 @@ def image_of(material):
     nodes = material.node_tree.nodes if material and material.use_nodes and material.node_tree else ()
     nodes = [node for node in nodes if node.type == 'TEX_IMAGE' and node.image and min(node.image.size) > 0]
     return next((node for node in nodes if node.show_texture), nodes[0]).image if nodes else None
+
+
+def _picture(image):
+    if image is None:
+        return None
+    tiles = [tile.number for tile in image.tiles] if image.source == 'TILED' else [1001]
+    return Picture(image.size[0] * image.size[1], frozenset(tiles))
 
 
 def _aspect(image):

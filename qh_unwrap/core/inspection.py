@@ -35,11 +35,11 @@ class Inspection:
     overlaps_itself: np.ndarray
     """(k,) bool, the islands of which some triangles lie on each other."""
     pairs: np.ndarray
-    """(p, 2), pairs of islands that lie on each other; each that does is in one of them."""
+    """(p, 2), pairs of islands that lie on each other, of each stack the first; each that does is in one of them."""
     covered: np.ndarray
     """(t,) bool, the triangles that lie on another one, of any island."""
     stack: np.ndarray
-    """(k,) numbers, the same for islands whose faces coincide exactly: they count as stacked on purpose."""
+    """(k,) the first of the islands whose faces coincide exactly with those of each: they count as stacked on purpose."""
 
 
 def inspect(
@@ -132,7 +132,8 @@ def _are_simple(islands, chosen, own_uv, points, mirrored):
 
 
 def _stacks(islands, own_uv, sheet, face_start):
-    """The stack of each island, (k,): those on one sheet whose faces have the very same corners, in any order."""
+    """The first island of each one's stack, (k,): those on one sheet whose faces have the very same corners, in any
+    order."""
     chosen = np.flatnonzero(islands.face_island >= 0)
     places = np.ascontiguousarray(own_uv[islands.corner_vertex].astype(np.float32) + 0.0).view(np.uint64).ravel()
     faces = np.add.reduceat(_mixed(places), face_start)[chosen]
@@ -140,7 +141,8 @@ def _stacks(islands, own_uv, sheet, face_start):
     starts = starts_of_numbers(islands.face_island[chosen][order], islands.count)
     sums = np.add.reduceat(_mixed(faces)[order], starts)
     keys = np.column_stack([sums, np.asarray(sheet).astype(np.uint64)])
-    return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return first[number.ravel()]
 
 
 def _mixed(values):

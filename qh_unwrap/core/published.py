@@ -52,36 +52,78 @@ def published(points: np.ndarray, uv: np.ndarray) -> Published | None:
 
     None where all is without area in space or in the map.
     """
+    return published_of_islands(points, uv, np.zeros(len(points), dtype=int), 1).of(0)
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedMeasures:
+    """The same of many islands: rows in the order of the fields of `Published`, NaN where there are none."""
+
+    values: np.ndarray  # (9, k)
+
+    def of(self, k: int) -> Published | None:
+        """The measures of the k-th island."""
+        row = self.values[:, k].tolist()
+        return None if np.isnan(row[0]) else Published(*row)
+
+
+def published_of_islands(points: np.ndarray, uv: np.ndarray, island: np.ndarray, count: int) -> PublishedMeasures:
+    """The measures of each of `count` islands, whose numbers `island` (m,) ascend, as if it were the whole mesh."""
     points, uv = np.asarray(points, dtype=np.float64), np.asarray(uv, dtype=np.float64)
-    area = areas_of(points)
-    points, uv, area = (each[area > 0] for each in (points, uv, area))
+    area, in_map = areas_of(points), np.abs(signed_areas(uv))
+    total, total_in_map = (np.bincount(island, each, count) for each in (area, in_map))
+    there = (total > 0) & (total_in_map > 0)
+    values = np.full((len(fields(Published)), count), np.nan)
+    its = (area > 0) & there[island]
+    if its.any():
+        values[:, there] = _measures(points[its], uv[its], area[its], (np.cumsum(there) - 1)[island[its]])
+    return PublishedMeasures(values)
+
+
+def _measures(points, uv, area, island):
+    """The rows of measures (9, k) of islands that all have some area, of triangles that all have some in space."""
+    starts = np.searchsorted(island, np.arange(island[-1] + 1))
     signed = signed_areas(uv)
-    in_map = np.abs(signed)
-    total, total_in_map = area.sum(), in_map.sum()
-    if not (total > 0 and total_in_map > 0):
-        return None
-    scale = np.sqrt(total / total_in_map)
+
+    def sums(values):
+        return np.add.reduceat(values, starts)
+
+    def largest(values):
+        return np.maximum.reduceat(values, starts)
+
+    def lowest(values):
+        return np.minimum.reduceat(values, starts)
+
+    total, total_in_map = sums(area), sums(np.abs(signed))
+    share, share_in_map = area / total[island], np.abs(signed) / total_in_map[island]
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         larger, smaller = by_parts(_stretches, points.T, uv.T)
-        width = np.ptp(uv.reshape(-1, 2), axis=0).max()
-        resolution = float((width / smaller).max())
+        width = _widths(uv, starts).max(axis=1)
+        resolution = width * largest(1 / smaller)
+        scale = np.sqrt(total / total_in_map)[island]
         larger, smaller = larger * scale, smaller * scale
-        share, share_in_map = area / total, in_map / total_in_map
         ratio = share_in_map / share
         aspect = np.where(smaller > 0, larger / smaller, np.inf)
         angles = np.abs(corner_angles(_flat(points.T).T) - corner_angles(uv)).sum(axis=1)
-        flipped = float((signed < 0).mean())
-        return Published(
-            max_area_distortion=float((ratio + 1 / ratio).max() - 2),
-            average_area_discrepancy=float(np.abs(share_in_map - share).sum()),
-            max_angle_distortion=float((aspect + 1 / aspect).max() - 2),
-            average_angle_discrepancy=float(share @ np.where(_has_angles(uv), angles, 6 * np.pi)),
-            min_singular_value=float(smaller.min()),
-            max_singular_value=float(larger.max()),
-            proportion_flipped=min(flipped, 1 - flipped),
-            resolution=resolution,
-            symmetric_dirichlet_energy=float(share @ (larger**2 + smaller**2 + larger**-2 + smaller**-2) / 2),
+        flipped = sums((signed < 0).astype(float)) / sums(np.ones(len(signed)))
+        return np.array(
+            [
+                largest(ratio + 1 / ratio) - 2,
+                sums(np.abs(share_in_map - share)),
+                largest(aspect + 1 / aspect) - 2,
+                sums(share * np.where(_has_angles(uv), angles, 6 * np.pi)),
+                lowest(smaller),
+                largest(larger),
+                np.minimum(flipped, 1 - flipped),
+                resolution,
+                sums(share * (larger**2 + smaller**2 + larger**-2 + smaller**-2)) / 2,
+            ]
         )
+
+
+def _widths(uv, starts):
+    """The sizes (k, 2) of the boxes around islands' UVs (m, 3, 2)."""
+    return np.maximum.reduceat(uv.max(axis=1), starts) - np.minimum.reduceat(uv.min(axis=1), starts)
 
 
 def _flat(points):

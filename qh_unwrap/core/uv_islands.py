@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The islands that UVs make by themselves, whatever the mesh and its seams are like."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -57,7 +58,8 @@ def uv_islands(
     """
     corner_face, following = around_faces(face_start, len(corner_vertex))
     no_seam = np.zeros(edge_count, dtype=bool)
-    links, faces = [_NO_LINKS], selected
+    links: list[Sequence[np.ndarray]] = [_NO_LINKS]
+    faces = selected
     while faces.any():  # one layer of faces with the same corners after the other
         doubled = find_doubles(corner_vertex, corner_edge, face_start, no_seam, faces).among(len(face_start)) & faces
         corners = np.flatnonzero((faces & ~doubled)[corner_face])

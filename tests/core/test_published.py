@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from qh_unwrap.core.published import published
+from qh_unwrap.core.published import published, published_of_islands
 
 from . import shapes
 
@@ -87,3 +87,15 @@ def test_what_is_collapsed_is_infinite_and_what_is_nothing_is_left_out():
     assert found.max_angle_distortion == found.max_area_distortion == found.resolution == np.inf
     assert found.min_singular_value == 0 and np.isfinite(found.average_angle_discrepancy)
     assert published(points, 0 * uv) is None
+
+
+def test_islands_are_measured_each_as_if_alone():
+    meshes = list(_meshes())[:3]
+    points = [vertices[triangles] for vertices, triangles, _ in meshes]
+    uvs = [uv[triangles] for _, triangles, uv in meshes]
+    uvs[1] = 0 * uvs[1]
+    island = np.repeat(np.arange(3), [len(each) for each in points])
+    found = published_of_islands(np.concatenate(points), np.concatenate(uvs), island, 3)
+    assert found.of(1) is None
+    for k in (0, 2):
+        assert found.of(k).to_dict() == pytest.approx(published(points[k], uvs[k]).to_dict(), rel=1e-12)
