@@ -225,7 +225,7 @@ def _images(obj, mesh):
         else f"object {obj.name_full}"
         for image, material in zip(images, materials, strict=True)
     )
-    aspects = np.array([_aspect(image) for image in images])
+    aspects = np.array([aspect_of(image) for image in images])
     return slot, names, aspects, tuple(_picture(image) for image in images)
 
 
@@ -243,7 +243,7 @@ def _picture(image):
     return Picture(image.size[0] * image.size[1], frozenset(tiles))
 
 
-def _aspect(image):
+def aspect_of(image):
     """Width by height of the image as it is shown, 1 for none."""
     if image is None:
         return 1.0

@@ -101,6 +101,40 @@ class SeamOptions:
         _check(self)
 
 
+_QUANTITY = (
+    Choice(
+        "STRETCH",
+        "Stretch",
+        "How far the image is drawn out on the model, compared with the whole island; 1 is not at all",
+    ),
+    Choice("ANGLE", "Angle", "How much longer than wide a square of the image becomes on the model; 1 is not at all"),
+    Choice("AREA", "Area", "How much of the image a face gets, compared with the whole island"),
+    Choice(
+        "DENSITY",
+        "Texel Density",
+        "Pixels of the material's image along a meter, compared with all that is shown; as if there were one of 1024"
+        " pixels where there is none",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class HeatSettings:
+    """What a heatmap shows.  Values are checked as well."""
+
+    quantity: str = setting("STRETCH", "Show", "What the colors mean", choices=_QUANTITY)
+    limit: float = setting(
+        2.0,
+        "Full Color",
+        "The ratio at which the color is strongest",
+        range=(1.001, 1000.0),
+        soft_range=(1.05, 10.0),
+    )
+
+    def __post_init__(self):
+        _check(self)
+
+
 def _check(owner):
     for field in dataclasses.fields(owner):
         check(field, getattr(owner, field.name))

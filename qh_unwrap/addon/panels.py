@@ -6,6 +6,7 @@ import textwrap
 import bpy
 
 from . import properties
+from .heatmap import heatmap
 from .last_run import last_run
 from .outcome import change, faults
 
@@ -18,6 +19,10 @@ def draw_menu(menu, _context):
 def draw_seam_menu(menu, _context):
     menu.layout.separator()
     menu.layout.operator("uv.qh_seams")
+
+
+def draw_distortion_menu(menu, _context):
+    menu.layout.operator("uv.qh_heatmap")
 
 
 class _Panel:
@@ -46,6 +51,22 @@ class _SeamPanel:
         for name, value in settings.as_keywords().items():
             setattr(button, name, value)
         properties.draw_seams(layout.column(), settings, context.object)
+
+
+class _DistortionPanel:
+    bl_label = "Distortion"
+    bl_region_type = 'UI'
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator("uv.qh_heatmap", text="Heatmap", icon='SHADING_RENDERED', depress=heatmap.is_on)
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        settings = context.scene.qh_heatmap
+        for field in settings.fields:
+            column.prop(settings, field.name)
 
 
 class _ReportPanel:
@@ -121,6 +142,16 @@ class QH_PT_uv_editor_seams(_SeamPanel, bpy.types.Panel):
 
 
 class QH_PT_view_3d_seams(_SeamPanel, bpy.types.Panel):
+    bl_space_type = 'VIEW_3D'
+    bl_parent_id = "QH_PT_view_3d"
+
+
+class QH_PT_uv_editor_distortion(_DistortionPanel, bpy.types.Panel):
+    bl_space_type = 'IMAGE_EDITOR'
+    bl_parent_id = "QH_PT_uv_editor"
+
+
+class QH_PT_view_3d_distortion(_DistortionPanel, bpy.types.Panel):
     bl_space_type = 'VIEW_3D'
     bl_parent_id = "QH_PT_view_3d"
 

@@ -7,7 +7,7 @@ import bpy
 
 from ..core import Settings
 from ..core.seam_settings import SeamSettings
-from .options import MeshOptions, SeamOptions
+from .options import HeatSettings, MeshOptions, SeamOptions
 
 
 def _property(field, options=frozenset()):
@@ -95,6 +95,13 @@ class SeamOperatorProperties(_Cutting, kinds=(SeamOptions, SeamSettings), option
     """The same for an operator, which forgets them after each run."""
 
 
+class HeatProperties(_Properties, kinds=(HeatSettings,)):
+    """What the heatmap shows."""
+
+    def heat_settings(self):
+        return _made_from(self, HeatSettings)
+
+
 _FIRST = ('boundary', 'aspect', 'balance', 'iterations', 'weights')
 _SECTIONS = {
     "Layout": ('placement', 'rotate', 'margin_method', 'margin'),
@@ -164,3 +171,7 @@ class QHUnwrapSceneSettings(SettingsProperties, bpy.types.PropertyGroup):
 
 class QHSeamsSceneSettings(SeamProperties, bpy.types.PropertyGroup):
     """The same for seams."""
+
+
+class QHHeatSceneSettings(HeatProperties, bpy.types.PropertyGroup):
+    """The same for the heatmap."""

@@ -23,6 +23,12 @@ def mesh_objects(context):
     return []
 
 
+def shown_meshes(context):
+    """The same to look at: every object of a mesh, linked ones too."""
+    objects = context.objects_in_mode if context.mode == 'EDIT_MESH' else context.selected_objects
+    return [obj for obj in objects if obj.type == 'MESH']
+
+
 def distinct_meshes(objects):
     """The first object of each mesh that can be changed."""
     found = {}
