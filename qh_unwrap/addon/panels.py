@@ -25,6 +25,10 @@ def draw_distortion_menu(menu, _context):
     menu.layout.operator("uv.qh_heatmap")
 
 
+def draw_check_menu(menu, _context):
+    menu.layout.operator("uv.qh_check")
+
+
 class _Panel:
     bl_label = "QH Unwrap"
     bl_category = "QH Unwrap"
@@ -36,6 +40,10 @@ class _Panel:
         button = layout.operator("uv.qh_unwrap", text="Unwrap", icon='UV')
         for name, value in settings.as_keywords().items():
             setattr(button, name, value)
+        row = layout.row(align=True)
+        row.operator("uv.qh_check", icon='VIEWZOOM')
+        if context.mode == 'EDIT_MESH':
+            row.operator("uv.qh_check", text="", icon='RESTRICT_SELECT_OFF').only_selected = True
         properties.draw(layout.column(), settings)
 
 
@@ -84,6 +92,8 @@ class _ReportPanel:
                 row = self.layout.row()
                 _draw_text(row.column(align=True), line, icon)
                 _draw_select(row, outcome)
+        if last_run.check is not None:
+            _draw_check(self.layout, last_run.check)
         if last_run.overlapping:
             self.layout.operator("uv.qh_unwrap_pack_overlapping", icon='UV_ISLANDSEL')
         if last_run.closed:
@@ -104,6 +114,26 @@ def _draw_text(column, text, icon):
         icon = 'BLANK1'
 
 
+def _draw_check(layout, check):
+    """What is true of all islands together, and buttons that select what was found."""
+    if check.texel_density:
+        layout.label(text=f"{check.texel_density:.1f} pixels per metre", icon='TEXTURE')
+    column = layout.column(align=True)
+    for kind, text in _KINDS.items():
+        row = column.row(align=True)
+        row.enabled = bool(last_run.found(kind))
+        row.operator("uv.qh_check_select", text=text, icon='RESTRICT_SELECT_OFF').kind = kind
+
+
+_KINDS = {
+    'FLIPPED': "Flipped Faces",
+    'MIRRORED': "Mirrored Islands",
+    'OVERLAPPING': "Overlapping Faces",
+    'WORST': "Worst 1 %",
+    'LOOK': "Islands to Look At",
+}
+
+
 def _draw_select(row, outcome):
     """A button that selects the island's faces."""
     button = row.operator("uv.qh_unwrap_select", text="", icon='RESTRICT_SELECT_OFF')
@@ -122,6 +152,8 @@ def _draw_outcome(column, outcome):
         stretch = change(outcome.before, outcome.after, "l2_stretch")
         faulty = faults(outcome.after.flips, outcome.after.collapsed)
         column.label(text=f"Stretch {stretch}, {faulty}", icon='BLANK1')
+        if outcome.texel_density:
+            column.label(text=f"{outcome.texel_density:.1f} pixels per metre", icon='BLANK1')
 
 
 class QH_PT_uv_editor(_Panel, bpy.types.Panel):

@@ -3,7 +3,7 @@
 
 import bpy
 
-from . import heat_operators, operators, panels, properties, report_operators
+from . import check_operators, heat_operators, operators, panels, properties, report_operators
 from .heatmap import heatmap
 from .last_run import last_run
 
@@ -13,6 +13,8 @@ _CLASSES = (
     properties.QHHeatSceneSettings,
     operators.QH_OT_unwrap,
     operators.QH_OT_seams,
+    check_operators.QH_OT_check,
+    check_operators.QH_OT_check_select,
     heat_operators.QH_OT_heatmap,
     report_operators.QH_OT_select,
     report_operators.QH_OT_pack_overlapping,
@@ -28,34 +30,38 @@ _CLASSES = (
     panels.QH_PT_view_3d_report,
 )
 
-_DISTORTION_MENUS = (bpy.types.IMAGE_MT_uvs, bpy.types.VIEW3D_MT_uv_map)
-_SEAM_MENUS = (bpy.types.IMAGE_MT_uvs, bpy.types.VIEW3D_MT_uv_map, bpy.types.VIEW3D_MT_edit_mesh_edges)
+_SETTINGS = {
+    "qh_unwrap": properties.QHUnwrapSceneSettings,
+    "qh_seams": properties.QHSeamsSceneSettings,
+    "qh_heatmap": properties.QHHeatSceneSettings,
+}
+
+_UV_MENUS = (bpy.types.IMAGE_MT_uvs, bpy.types.VIEW3D_MT_uv_map)
+_ENTRIES = (
+    (panels.draw_menu, (bpy.types.IMAGE_MT_uvs_unwrap,)),  # which the U menu of the 3D View contains too
+    (panels.draw_seam_menu, (*_UV_MENUS, bpy.types.VIEW3D_MT_edit_mesh_edges)),
+    (panels.draw_check_menu, _UV_MENUS),
+    (panels.draw_distortion_menu, _UV_MENUS),
+)
 
 
 def register():
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Scene.qh_unwrap = bpy.props.PointerProperty(type=properties.QHUnwrapSceneSettings)
-    bpy.types.Scene.qh_seams = bpy.props.PointerProperty(type=properties.QHSeamsSceneSettings)
-    bpy.types.Scene.qh_heatmap = bpy.props.PointerProperty(type=properties.QHHeatSceneSettings)
-    # The U menu of the 3D View contains this menu too.
-    bpy.types.IMAGE_MT_uvs_unwrap.append(panels.draw_menu)
-    for menu in _SEAM_MENUS:
-        menu.append(panels.draw_seam_menu)
-    for menu in _DISTORTION_MENUS:
-        menu.append(panels.draw_distortion_menu)
+    for name, kind in _SETTINGS.items():
+        setattr(bpy.types.Scene, name, bpy.props.PointerProperty(type=kind))
+    for draw, menus in _ENTRIES:
+        for menu in menus:
+            menu.append(draw)
 
 
 def unregister():
     heatmap.turn_off()
-    for menu in _DISTORTION_MENUS:
-        menu.remove(panels.draw_distortion_menu)
-    for menu in _SEAM_MENUS:
-        menu.remove(panels.draw_seam_menu)
-    bpy.types.IMAGE_MT_uvs_unwrap.remove(panels.draw_menu)
-    del bpy.types.Scene.qh_heatmap
-    del bpy.types.Scene.qh_seams
-    del bpy.types.Scene.qh_unwrap
+    for draw, menus in reversed(_ENTRIES):
+        for menu in menus:
+            menu.remove(draw)
+    for name in _SETTINGS:
+        delattr(bpy.types.Scene, name)
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)
     last_run.forget()

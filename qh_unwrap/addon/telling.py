@@ -2,7 +2,7 @@
 """What operators report of a run."""
 
 from . import cutting
-from .outcome import error_sentences, listed, sentences, summary
+from .outcome import check_summary, error_sentences, listed, sentences, summary
 
 
 def tell(operator, outcomes, cuts):
@@ -16,6 +16,15 @@ def tell(operator, outcomes, cuts):
         return {'CANCELLED'}
     clean = not failed and all(outcome.is_clean for outcome in outcomes)
     operator.report({'INFO'} if clean else {'WARNING'}, summary(outcomes))
+    return {'FINISHED'}
+
+
+def tell_of_check(operator, outcomes):
+    """Report what a check found; returns what the operator returns."""
+    for sentence in (*error_sentences(outcomes), *sentences(outcomes)):
+        operator.report({'INFO'}, sentence)
+    clean = all(outcome.is_clean for outcome in outcomes)
+    operator.report({'INFO'} if clean else {'WARNING'}, check_summary(outcomes))
     return {'FINISHED'}
 
 

@@ -39,7 +39,7 @@ class Inspection:
     covered: np.ndarray
     """(t,) bool, the triangles that lie on another one, of any island."""
     stack: np.ndarray
-    """(k,) the first of the islands whose faces coincide exactly with those of each: they count as stacked on purpose."""
+    """(k,) the first island whose faces coincide exactly with those of each: such are stacked on purpose."""
 
 
 def inspect(
