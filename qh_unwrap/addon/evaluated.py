@@ -54,7 +54,8 @@ def read(obj, view_layer):
     nothing in the file changes, and so nobody is told of a change.
     """
     shown = obj.evaluated_get(view_layer.depsgraph)
-    metre = view_layer.id_data.unit_settings.scale_length
+    units = view_layer.id_data.unit_settings
+    metre = units.scale_length if units.system != 'NONE' else 1.0
     try:
         return _read(obj, shown.to_mesh(), metre * np.array(obj.matrix_world.to_3x3()))
     finally:

@@ -213,7 +213,7 @@ def _free_part(context):
     for other in context.area.regions:
         if other.width > 1 and other.type in {'TOOLS', 'UI'}:
             first, last = other.x - region.x, other.x + other.width - region.x
-            if 0 <= first and last <= region.width:  # over it, and not beside it
+            if first >= 0 and last <= region.width:  # over it, and not beside it
                 begin, end = (max(begin, last), end) if other.alignment == 'LEFT' else (begin, min(end, first))
     return begin, end
 

@@ -9,6 +9,7 @@ each step yields.  `gui` opens workspaces and sidebars, moves the pointer, press
 import bpy  # isort: skip  (the wheel knows bmesh only after this)
 import bmesh
 import numpy as np
+from everything_in_file import differences, everything
 
 
 def steps(gui):
@@ -23,6 +24,7 @@ def steps(gui):
     yield from _reports(gui)
     yield from _troubles(gui)
     yield from _seams(gui)
+    yield from _heatmap(gui)
     yield from _long_work(gui)
 
 
@@ -162,6 +164,39 @@ def _seams(gui):
         bpy.ops.image.view_all(fit_view=True)
     yield 1
     gui.shot("21_seams.png")
+
+
+def _heatmap(gui):
+    """It shows each quantity, follows the UVs, and leaves everything as it was."""
+    _add(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
+    with gui.override('VIEW_3D'):
+        bpy.ops.uv.unwrap(method='CONFORMAL', margin=0.01)
+    yield 1
+    everything()  # reading some of it makes it
+    before = everything()
+    for _ in ("on", "off", "on"):
+        with gui.override('VIEW_3D'):
+            bpy.ops.uv.qh_heatmap()
+        yield 1
+        assert not differences(before, everything()), differences(before, everything())[:9]
+    for quantity in ('STRETCH', 'ANGLE', 'AREA', 'DENSITY'):
+        bpy.context.scene.qh_heatmap.quantity = quantity
+        yield 1
+        gui.shot(f"22_heatmap_{quantity.lower()}.png")
+    bpy.context.scene.qh_heatmap.property_unset("quantity")
+    with gui.override('VIEW_3D'):
+        bpy.ops.uv.qh_unwrap()
+    yield 2
+    gui.shot("23_heatmap_followed.png")
+    with gui.override('VIEW_3D'):
+        bpy.ops.object.mode_set(mode='OBJECT')
+    yield 1
+    gui.shot("24_heatmap_object_mode.png")
+    with gui.override('VIEW_3D'):
+        bpy.ops.object.mode_set(mode='EDIT')
+        bpy.ops.uv.qh_heatmap()
+    yield 1
+    gui.shot("25_heatmap_off.png")
 
 
 def _troubled(calc_uvs):

@@ -3,7 +3,17 @@
 
 import bpy
 
-_VOLATILE = {"rna_type", "bl_rna", "original", "is_evaluated", "is_updated", "session_uid", "is_dirty", "storage_type"}
+_VOLATILE = {  # what is not in the file
+    "bl_rna",
+    "depsgraph",
+    "is_dirty",
+    "is_evaluated",
+    "is_updated",
+    "original",
+    "rna_type",
+    "session_uid",
+    "storage_type",
+}
 _UNREADABLE = {  # without a window, Blender 4 crashes
     "SpaceNodeEditor.cursor_location",
     "SpaceProperties.search_filter",
