@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line: `qh-unwrap`, `python -m qh_unwrap` and `blender --command qh_unwrap`; and the same for Python.
 
-Exit codes: 0 everything unwrapped, 1 something failed (the rest is written), 2 wrong usage, 3 nothing could be written;
-130 and 143 after SIGINT and SIGTERM.
+Exit codes: 0 everything unwrapped, or no fault found; 1 something failed (the rest is written), or faults found;
+2 wrong usage; 3 nothing could be done; 130 and 143 after SIGINT and SIGTERM.
 """
 
 import argparse
@@ -13,10 +13,11 @@ import traceback
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from . import console, flags
+from . import asked, console, flags
 from .addon import stopping, streams, writing
 from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
 from .addon.failures import FileError, UsageError
+from .addon.last_run import last_run
 from .addon.options import MeshOptions, SeamOptions
 from .core import Settings, UnwrapError
 from .core.seam_settings import SeamSettings
@@ -106,13 +107,9 @@ def _understood(argv):
         args, others = parser.parse_known_args(argv)
     except UsageError:
         args, others = parser.parse_args([]), []
-    if args.json and any(_is_same(args.json, each.partition("=")[2] or each) for each in others):
+    if args.json and any(asked.is_same(args.json, each.partition("=")[2] or each) for each in others):
         args.json = None  # it names the input, or another file
     return args
-
-
-def _is_same(one, other):
-    return os.path.realpath(one) == os.path.realpath(other)
 
 
 def _carried_out(args, progress=None):
@@ -146,7 +143,7 @@ def _finish(args, record):
 def _run(args, record, progress):
     record.input, record.output = str(args.input), str(args.output) if args.output else None
     record.strict = bool(args.strict)
-    _check_paths(args)
+    asked.check_paths(args)
     if args.weld is None:
         args.weld = Path(args.input).suffix.lower() in flags.SPLIT
     try:
@@ -165,10 +162,10 @@ def _run(args, record, progress):
             import bpy
         except ImportError:
             raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
-        from .addon import choosing, files, jobs, patches, preview, selection
+        from .addon import choosing, files, inspecting, jobs, measuring, patches, preview, selection
     record.blender = bpy.app.version_string
 
-    _check_formats(args, files, preview)
+    asked.check_formats(args, files, preview)
     record.write = patches.mode(args.write, args.input, args.output)
     _keep(args, record)  # which says that the run is not finished, in place of what an earlier one said
     record.begin("read")
@@ -179,11 +176,12 @@ def _run(args, record, progress):
     record.skipped = choice.skipped
     objects = choice.required()
     maps = choosing.Maps(objects, args.uv_map, args.texcoord)
-    _check_room(args, objects, files)
-    record.begin("unwrap")
+    asked.check_room(args, objects, files)
+    record.begin("check" if args.check else "unwrap")
     if args.seams_from_islands:
         files.mark_cuts(objects, options)
-    targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
+    faces = selection.all_faces if args.check else selection.visible_faces
+    targets = [selection.Target(obj, faces(obj.data)) for obj in objects]
     targets = choice.narrowed(targets, args.material)
     objects = choice.required()
     maps.make_missing(objects)
@@ -195,10 +193,18 @@ def _run(args, record, progress):
             progress(share)
 
     with streams.quiet():
-        steps = jobs.cut_and_unwrap(targets, settings, options, bpy.context, seam_settings, seam_options)
-        outcomes, cuts = finished(mapped(step, steps))
+        if args.check:
+            outcomes, cuts = finished(mapped(step, inspecting.check_targets(targets, bpy.context, options))), []
+            record.check, record.published = last_run.check.to_dict(), last_run.check.published
+        else:
+            steps = jobs.cut_and_unwrap(targets, settings, options, bpy.context, seam_settings, seam_options)
+            outcomes, cuts = finished(mapped(step, steps))
+            record.published = measuring.add_published(outcomes, targets, options)
     record.cuts = [cut.to_dict() for cut in cuts if cut.new.any()]
     record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
+    if args.check:
+        record.judge()
+        return
     record.begin("write")
     if record.done:
         _write(args, record, maps, targets, options, patch)
@@ -295,56 +301,3 @@ def _reason(error):
 def _made_from(args, kind):
     names = [field.name for field in dataclasses.fields(kind)]
     return kind(**{name: getattr(args, name) for name in names if hasattr(args, name)})
-
-
-def _check_paths(args):
-    """Raise `UsageError` where the files cannot be meant, before anything is written, the report included."""
-    if args.input != "suzanne":
-        args.input = Path(args.input)
-        if args.json and _is_same(args.json, args.input):
-            args.json = None
-            raise UsageError(f"--json would replace the input {args.input}: choose another name")
-        if not args.input.is_file():
-            raise UsageError(f"there is no file {args.input}")
-    report = args.json if str(args.json) != "-" else None
-    places = {}
-    sibling = None if args.write == "patch" else _sibling(args.output)
-    for path in filter(None, (args.output, sibling, report, args.preview)):
-        place = os.path.realpath(path)
-        if place in places:
-            args.json = None
-            raise UsageError(f"{path} is asked for twice: choose another name")
-        places[place] = path
-    for path in places.values():
-        if not path.absolute().parent.is_dir():
-            raise UsageError(f"there is no folder {path.absolute().parent}")
-        if path.exists() and not path.is_file():
-            raise UsageError(f"{path} is a folder, or no file to write to")
-        if path.exists() and not args.overwrite:
-            raise UsageError(f"{path} exists: choose another name, or pass --overwrite")
-    for path in places.values():
-        writing.check_folder(path)
-
-
-def _sibling(path):
-    """The other file that the format writes, if any."""
-    suffix = {".obj": ".mtl", ".gltf": ".bin"}.get(path.suffix.lower()) if path else None
-    return path.with_suffix(suffix) if suffix else None
-
-
-def _check_formats(args, files, preview):
-    if args.input != "suzanne" and args.input.suffix.lower() not in files.READERS:
-        raise UsageError(f"cannot read {args.input}: use {', '.join(files.READERS)}")
-    if args.output and args.output.suffix.lower() not in files.WRITERS:
-        raise UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(files.WRITERS)}")
-    if args.preview and args.preview.suffix.lower() not in preview.FORMATS:
-        raise UsageError(f"cannot write {args.preview}: pictures can be {', '.join(preview.FORMATS)}")
-    if args.texcoord is not None and not (isinstance(args.texcoord, int) and args.texcoord >= 0):
-        raise UsageError(f"--texcoord is {args.texcoord!r}: choose a whole number from 0")
-
-
-def _check_room(args, objects, files):
-    sizes = {args.preview: 100_000} if args.preview else {}
-    if args.output:
-        sizes[args.output] = files.likely_size(args.output, args.input, objects)
-    writing.check_room(sizes)

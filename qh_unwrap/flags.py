@@ -26,12 +26,14 @@ examples:
       pack a second UV map of some objects, in the same file
   qh-unwrap model.obj --boundary CIRCLE --balance 0.5 --refine 0 --preview picture.png
       look at the published map, and write nothing else
+  qh-unwrap --check model.glb --json report.json
+      check the UVs that are there, and change nothing
 
 exit codes:
-  0  everything is unwrapped
-  1  some islands failed, or with --strict are not certified; the rest is written
+  0  everything is unwrapped; with --check, no fault was found
+  1  some islands failed, or with --strict are not certified; the rest is written; with --check, faults were found
   2  wrong usage
-  3  nothing could be written: nothing was unwrapped, or a file could not be read or written
+  3  nothing could be done: nothing was unwrapped, or a file could not be read or written
   130, 143  stopped by Ctrl C or SIGTERM; nothing half done is left
 """
 _NEEDS = {  # what each flag counts with, where its description does not say so
@@ -67,6 +69,11 @@ def parser():
     )
     made.add_argument("input", metavar="INPUT", help=_INPUT)
     made.add_argument("-o", "--output", type=Path, help="file to write, in any of these formats except .stl")
+    made.add_argument(
+        "--check",
+        action="store_true",
+        help="unwrap nothing: say what there is to say of the UVs in the file; exits with 1 if there are faults",
+    )
     made.add_argument("--object", action="append", metavar="NAME", help="unwrap this object only; may be repeated")
     made.add_argument("--seams-from-islands", action="store_true", help="first mark the cuts of the old UVs as seams")
     made.add_argument(

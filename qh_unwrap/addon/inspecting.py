@@ -41,7 +41,6 @@ class Check:
         """JSON-ready."""
         return dict(
             distortion=self.whole and self.whole.to_dict(),
-            published=self.published and self.published.to_dict(),
             texel_density=self.texel_density,
             **{f"{kind}_faces": sum(map(len, its.values())) for kind, its in self.faces.items()},
         )

@@ -249,6 +249,15 @@ def mean_change(outcomes, name):
     return f"{_shown(_mean(outcomes, [getattr(outcome.before, name) for outcome in outcomes]))} → {after}"
 
 
+def shown_density(outcomes):
+    """The texel density of several, from the least to the largest: "512.0", "256.0 – 512.0", "-" for none."""
+    known = [f"{outcome.texel_density:.1f}" for outcome in outcomes if outcome.texel_density]
+    if not known:
+        return "-"
+    least, most = min(known, key=float), max(known, key=float)
+    return least if least == most else f"{least} – {most}"
+
+
 def told_of(reason, names):
     """What there is to say of objects: "2 objects without faces: Cube, Plane"."""
     return f"{count(len(names), 'object')} {reason}: {listed(names)}"

@@ -74,6 +74,10 @@ def visible_faces(mesh):
     return ~hidden
 
 
+def all_faces(mesh):
+    return np.ones(len(mesh.polygons), dtype=bool)
+
+
 def _selected(obj, context):
     if obj.mode != 'EDIT':
         return visible_faces(obj.data)

@@ -10,7 +10,7 @@ import pytest
 import qh_unwrap
 
 _PACKAGE = Path(qh_unwrap.__file__).parent
-_FLOORS = ("core", "patching", "addon", "console", "flags", "cli", "__init__", "__main__")  # from the ground up
+_FLOORS = "core", "patching", "addon", "console", "flags", "asked", "cli", "__init__", "__main__"  # from the ground up
 
 
 def modules():
