@@ -3,6 +3,7 @@
 
 from ..core.stepping import mapped
 from . import cutting, mesh_arrays, modes
+from .last_run import last_run
 from .unwrapping import unwrap_targets
 
 _CUTTING = {'NEVER': 0.0, 'NEEDED': 0.1, 'DISTORTION': 0.7}  # the part of the work, by and large
@@ -20,6 +21,7 @@ def cut_and_unwrap(targets, settings, options, context, seam_settings=None, seam
         cuts = yield from mapped(lambda share: part * share, steps)
     steps = unwrap_targets(targets, settings, options, context, cuts)
     outcomes = yield from mapped(lambda share: part + (1 - part) * share, steps)
+    last_run.remember(outcomes, settings, options)
     return outcomes, cuts
 
 

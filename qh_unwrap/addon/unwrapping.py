@@ -15,7 +15,6 @@ from ..core.islands import attached, find_islands
 from ..core.stepping import mapped
 from . import judging, layout, mesh_arrays, modes, stacking
 from .hints import hint_at_seams
-from .last_run import last_run
 from .options import MeshOptions
 from .outcome import Outcome, count
 from .selection import Target
@@ -50,9 +49,7 @@ def unwrap_targets(
             with modes.in_object_mode(context):
                 for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
                     _write(obj, list(group), cuts.get(obj))
-    outcomes = [work.outcome for work in works]
-    last_run.remember(outcomes, settings, options)
-    return outcomes
+    return [work.outcome for work in works]
 
 
 _UNWRAPPING = 0.9  # of all the work, by and large; the rest is to see what lies on what
