@@ -15,7 +15,8 @@ def is_same(one, other):
 
 def check_paths(args):
     """Raise `UsageError` where the files cannot be meant, before anything is written, the report included."""
-    writes = {"--output": args.output, "--preview": args.preview, "--seams-from-islands": args.seams_from_islands}
+    pictures = {"--preview": args.preview, "--plot": args.plot}
+    writes = {"--output": args.output, **pictures, "--seams-from-islands": args.seams_from_islands}
     if args.check and any(writes.values()):
         unwanted = next(flag for flag, value in writes.items() if value)
         raise UsageError(f"--check changes and writes nothing but the report: leave out {unwanted}")
@@ -29,7 +30,7 @@ def check_paths(args):
     report = args.json if str(args.json) != "-" else None
     places = {}
     sibling = None if args.write == "patch" else _sibling(args.output)
-    for path in filter(None, (args.output, sibling, report, args.preview)):
+    for path in filter(None, (args.output, sibling, report, *pictures.values())):
         place = os.path.realpath(path)
         if place in places:
             args.json = None
@@ -52,7 +53,7 @@ def _sibling(path):
     return path.with_suffix(suffix) if suffix else None
 
 
-def check_formats(args, files, preview):
+def check_formats(args, files, preview, plotting):
     """Raise `UsageError` where a format cannot be read or written."""
     if args.input != "suzanne" and args.input.suffix.lower() not in files.READERS:
         raise UsageError(f"cannot read {args.input}: use {', '.join(files.READERS)}")
@@ -60,13 +61,15 @@ def check_formats(args, files, preview):
         raise UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(files.WRITERS)}")
     if args.preview and args.preview.suffix.lower() not in preview.FORMATS:
         raise UsageError(f"cannot write {args.preview}: pictures can be {', '.join(preview.FORMATS)}")
+    if args.plot and args.plot.suffix.lower() not in plotting.FORMATS:
+        raise UsageError(f"cannot write {args.plot}: plots can be {', '.join(plotting.FORMATS)}")
     if args.texcoord is not None and not (isinstance(args.texcoord, int) and args.texcoord >= 0):
         raise UsageError(f"--texcoord is {args.texcoord!r}: choose a whole number from 0")
 
 
 def check_room(args, objects, files):
     """Raise `FileError` where there is no room for the files."""
-    sizes = {args.preview: 100_000} if args.preview else {}
+    sizes = {path: 100_000 for path in (args.preview, args.plot) if path}
     if args.output:
         sizes[args.output] = files.likely_size(args.output, args.input, objects)
     writing.check_room(sizes)

@@ -79,7 +79,7 @@ def unwrap_file(path, output=None, **options):
                 value = flags.cut(value)
             except argparse.ArgumentTypeError as error:
                 raise UsageError(f"cut: {error}") from None
-        elif name in ("json", "preview") and value is not None:
+        elif name in ("json", "preview", "plot") and value is not None:
             value = Path(value)
         elif isinstance(value, str) and isinstance(known[name], str) and known[name]:  # a choice, and no free name
             value = value.upper()
@@ -162,10 +162,10 @@ def _run(args, record, progress):
             import bpy
         except ImportError:
             raise UsageError("this needs Blender: pip install 'qh-unwrap[bpy]', or run it inside Blender") from None
-        from .addon import choosing, files, inspecting, jobs, measuring, patches, preview, selection
+        from .addon import choosing, files, inspecting, jobs, measuring, patches, plotting, preview, selection
     record.blender = bpy.app.version_string
 
-    asked.check_formats(args, files, preview)
+    asked.check_formats(args, files, preview, plotting)
     record.write = patches.mode(args.write, args.input, args.output)
     _keep(args, record)  # which says that the run is not finished, in place of what an earlier one said
     record.begin("read")
@@ -207,12 +207,12 @@ def _run(args, record, progress):
         return
     record.begin("write")
     if record.done:
-        _write(args, record, maps, targets, options, patch)
+        _write(args, record, maps, targets, settings, options, patch)
     record.judge()
 
 
-def _write(args, record, maps, targets, options, patch):
-    from .addon import checking, files, losses, preview
+def _write(args, record, maps, targets, settings, options, patch):
+    from .addon import checking, files, losses, plotting, preview
 
     named = {outcome.obj for outcome in record.done}
     done = {target.obj for target in targets if target.obj.name in named}
@@ -224,6 +224,9 @@ def _write(args, record, maps, targets, options, patch):
         if args.preview:
             with _at_file("write", args.preview, record):
                 staging.write(args.preview, draw, checking.check_image)
+        if args.plot:
+            with _at_file("write", args.plot, record):
+                staging.write(args.plot, lambda path: _plot(path, targets, settings, options), plotting.check)
         if args.output:
             with _at_file("write", args.output, record):
                 is_patched = patch and _patch(args, record, patch, staging)
@@ -234,10 +237,23 @@ def _write(args, record, maps, targets, options, patch):
                 with _at_file("write", args.output, record):
                     files.stage(staging, args.output)
         try:
-            with _at_file("write", args.output or args.preview, record):
+            with _at_file("write", args.output or args.preview or args.plot, record):
                 staging.put_in_place()
         finally:
             record.files = staging.placed
+
+
+def _plot(path, targets, settings, options):
+    """Plot what became of the targets beside what Blender's own methods make of copies of them."""
+    import bpy
+
+    from .addon import comparing, plotting
+
+    methods = comparing.blenders(settings, options, current=False, ours=False)
+    comparison = finished(comparing.compare(targets, methods, bpy.context, options))
+    if comparison.figure is None:
+        raise FileError(f"there is nothing to plot, {comparison.remarks[0]}")
+    plotting.write(comparison.figure, path)
 
 
 def _patch(args, record, patch, staging):

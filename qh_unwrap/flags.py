@@ -100,6 +100,12 @@ def parser():
         "--preview", type=Path, metavar="FILE", help="draw the model and its UVs, checkered, into a .png or .jpg file"
     )
     made.add_argument(
+        "--plot",
+        type=Path,
+        metavar="FILE",
+        help="plot the distortion of every triangle, beside that of Blender's own methods, into a .png or .svg file",
+    )
+    made.add_argument(
         "--write",
         choices=("patch", "export"),
         help="patch: change nothing in the file but the UVs, if it is an .obj, .glb, .gltf or .usd file and stays one;"

@@ -57,7 +57,7 @@ def check_targets(
     joined = JoinedMeshes(targets, meshes)
     errors = [Outcome(name, 0, faces, is_check=True, error=reason) for reason, name, faces in joined.left_out()]
     if joined.selected.any():
-        islands, found = yield from mapped(lambda share: 0.1 + 0.7 * share, _inspected(joined))
+        islands, found = yield from mapped(lambda share: 0.1 + 0.7 * share, inspected(joined))
         outcomes = _outcomes(joined, islands, found)
         _number(outcomes + errors)
         _tell_of_overlaps(outcomes, found)
@@ -77,7 +77,9 @@ def unit(context):
     return units.scale_length if units.system != 'NONE' else 1.0
 
 
-def _inspected(joined):
+def inspected(joined):
+    """The islands of the selected faces of `JoinedMeshes`, and the `Inspection` of them.  A generator: yields the share
+    that is done."""
     topology = joined.corner_vertex, joined.corner_edge, joined.face_start, joined.edge_count, joined.corner_triangles
     islands = uv_islands(*topology, joined.uv, joined.selected)
     slot = _slots(joined, islands)

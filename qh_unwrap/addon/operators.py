@@ -13,7 +13,7 @@ from .running import InSteps
 last_outcomes = latest
 
 
-class _OnSelectedFaces(InSteps):
+class OnSelectedFaces(InSteps):
     """Mix-in for an operator on the faces that are selected."""
 
     @classmethod
@@ -26,7 +26,7 @@ class _OnSelectedFaces(InSteps):
         return False
 
 
-class QH_OT_unwrap(_OnSelectedFaces, properties.OperatorProperties, bpy.types.Operator):
+class QH_OT_unwrap(OnSelectedFaces, properties.OperatorProperties, bpy.types.Operator):
     """Unwrap the selected faces, in Object Mode all faces, with little distortion and without flipping any"""
 
     bl_idname = "uv.qh_unwrap"
@@ -59,7 +59,7 @@ class QH_OT_unwrap(_OnSelectedFaces, properties.OperatorProperties, bpy.types.Op
         return telling.tell(self, *result)
 
 
-class QH_OT_seams(_OnSelectedFaces, properties.SeamOperatorProperties, bpy.types.Operator):
+class QH_OT_seams(OnSelectedFaces, properties.SeamOperatorProperties, bpy.types.Operator):
     """Mark seams on the selected faces, in Object Mode on all faces, so that they unwrap with little distortion"""
 
     bl_idname = "uv.qh_seams"

@@ -6,6 +6,7 @@ import textwrap
 import bpy
 
 from . import properties
+from .comparison import latest
 from .heatmap import heatmap
 from .last_run import last_run
 from .outcome import change, faults
@@ -23,6 +24,8 @@ def draw_seam_menu(menu, _context):
 
 def draw_distortion_menu(menu, _context):
     menu.layout.operator("uv.qh_heatmap")
+    menu.layout.operator("uv.qh_compare")
+    menu.layout.operator("uv.qh_plot")
 
 
 def draw_check_menu(menu, _context):
@@ -75,6 +78,24 @@ class _DistortionPanel:
         settings = context.scene.qh_heatmap
         for field in settings.fields:
             column.prop(settings, field.name)
+        layout.separator()
+        layout.operator("uv.qh_compare", icon='SPREADSHEET')
+        layout.operator("uv.qh_plot", icon='GRAPH')
+        if latest.comparison is not None:
+            _draw_comparison(layout, latest.comparison)
+
+
+def _draw_comparison(layout, comparison):
+    """The latest one in few words, which fit into the sidebar."""
+    column = layout.column(align=True)
+    column.label(text=comparison.title, icon='UV')
+    for row in comparison.rows:
+        name, stretch, *_, flips, overlaps, _ = row.cells
+        numbers = row.error or f"stretch {stretch}, {flips} flipped, {overlaps} overlap"
+        _draw_text(column, f"{name}: {numbers}", 'BLANK1')
+    row = layout.row(align=True)
+    row.operator("uv.qh_compare_show", text="Table", icon='SPREADSHEET')
+    row.operator("uv.qh_plot_save", icon='FILE_TICK')
 
 
 class _ReportPanel:

@@ -3,7 +3,8 @@
 
 import bpy
 
-from . import check_operators, heat_operators, operators, panels, properties, report_operators
+from . import check_operators, compare_operators, heat_operators, operators, panels, properties, report_operators
+from .comparison import latest
 from .heatmap import heatmap
 from .last_run import last_run
 
@@ -16,6 +17,10 @@ _CLASSES = (
     check_operators.QH_OT_check,
     check_operators.QH_OT_check_select,
     heat_operators.QH_OT_heatmap,
+    compare_operators.QH_OT_compare,
+    compare_operators.QH_OT_compare_show,
+    compare_operators.QH_OT_plot,
+    compare_operators.QH_OT_plot_save,
     report_operators.QH_OT_select,
     report_operators.QH_OT_pack_overlapping,
     report_operators.QH_OT_cut_closed,
@@ -65,3 +70,4 @@ def unregister():
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)
     last_run.forget()
+    latest.comparison = None
