@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..core.distortion import Distortion, densities
+from ..core.distortion import Distortion
 from ..core.inspection import inspect
 from ..core.pieces import around_faces, starts_of_numbers
-from ..core.published import Published, published, published_of_islands
+from ..core.published import Published, published_of_islands
 from ..core.stepping import mapped
-from ..core.triangles import areas_of, signed_areas
+from ..core.triangles import areas_of, boxes_of, signed_areas
 from ..core.uv_islands import uv_islands
 from . import mesh_arrays, tiles
 from .joined_meshes import JoinedMeshes
@@ -108,12 +108,12 @@ def _outcomes(joined, islands, found):
     outcomes = [
         Outcome(name, 0, faces[start:end], after=distortion, injective=certified, is_check=True)
         for name, start, end, distortion, certified in zip(
-            names, ends[:-1], ends[1:], found.distortions, found.certified.tolist(), strict=True
+            names, ends[:-1], ends[1:], found.measured.islands, found.certified.tolist(), strict=True
         )
     ]
     for k in np.flatnonzero(~found.certified).tolist():
-        outcomes[k].faults += tuple(_faults(found.distortions[k], found.overlaps_itself[k]))
-    for k in np.flatnonzero(found.mirrored).tolist():
+        outcomes[k].faults += tuple(_faults(found.measured.islands[k], found.overlaps_itself[k]))
+    for k in np.flatnonzero(found.measured.mirrored).tolist():
         outcomes[k].mirrored = True
         outcomes[k].notes += ("it is mirrored",)
     turned = np.bincount(islands.face_island[islands.turned_faces], minlength=islands.count)
@@ -150,13 +150,14 @@ def _tell_of_overlaps(outcomes, found):
     for one, other in found.pairs.tolist():
         others.setdefault(one, []).append(other)
         others.setdefault(other, []).append(one)
+    labels = [outcome.label for outcome in outcomes] if others else []
     size = np.bincount(found.stack, minlength=len(outcomes))[found.stack]
     for k in np.flatnonzero(size > 1).tolist():
         outcomes[k].stacked = int(size[k]) - 1
         outcomes[k].notes += (f"it is stacked with {count(int(size[k]) - 1, 'other')}, face on face",)
     for k in np.flatnonzero(np.isin(found.stack, list(others))).tolist():
         its = sorted(others[int(found.stack[k])])
-        outcomes[k].overlaps = tuple(outcomes[other].label for other in its[:_NAMED])
+        outcomes[k].overlaps = tuple(labels[other] for other in its[:_NAMED])
         outcomes[k].more_overlaps = len(its[_NAMED:])
         outcomes[k].overlap_cure = "move it to a free place, or pack them together"
 
@@ -166,13 +167,13 @@ def _measured(joined, islands, found, outcomes, metres):
     slot = _slots(joined, islands)
     space, plane = joined.points[islands.corners], joined.uv[islands.corners]
     scale = np.column_stack([joined.slot_aspect[slot], np.ones(islands.count)])
-    scale[found.mirrored] *= (-1, 1)
+    scale[found.measured.mirrored] *= (-1, 1)
     seen = plane * scale[islands.island, None]
     measures = published_of_islands(space, seen, islands.island, islands.count)
     area = np.bincount(islands.island, areas_of(space), islands.count)
     pixels = joined.pixels[slot] * np.bincount(islands.island, np.abs(signed_areas(plane)), islands.count)
-    starts = islands.triangle_starts
-    low, high = np.minimum.reduceat(plane.min(axis=1), starts), np.maximum.reduceat(plane.max(axis=1), starts)
+    starts, (low, high) = islands.triangle_starts, boxes_of(plane)
+    low, high = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
     misplaced = tiles.faults(low, high, [joined.tiles[k] for k in slot.tolist()])
     rows = zip(outcomes, area.tolist(), pixels.tolist(), misplaced, strict=True)
     for k, (outcome, its_area, its_pixels, fault) in enumerate(rows):
@@ -183,8 +184,8 @@ def _measured(joined, islands, found, outcomes, metres):
     return Check(
         joined.face_counts,
         {kind: joined.split(faces) for kind, faces in _faces(joined, islands, found).items()},
-        found.whole,
-        published(space, seen),
+        found.measured.whole,
+        measures.whole,
         density(float(pixels[shown].sum()), float(area[shown].sum()), metres),
     )
 
@@ -197,11 +198,15 @@ def density(pixels, area, metres):
 def _faces(joined, islands, found):
     """The faces (k,) of each of the `KINDS`."""
     face = around_faces(joined.face_start, len(joined.corner_vertex))[0][islands.corners[:, 0]]
-    sign = np.concatenate([each.triangle_orientation for each in found.distortions])
     energy = np.zeros(len(joined.face_start))
-    np.maximum.at(energy, face, np.concatenate([densities(each) for each in found.distortions]))
+    np.maximum.at(energy, face, found.measured.energy)
     distorted = np.flatnonzero(energy > _UNDISTORTED)
     most = int(np.ceil(_WORST * joined.selected.sum()))
     worst = distorted[np.argsort(-energy[distorted], kind="stable")[:most]]
-    kinds = face[sign < 0], face[found.mirrored[islands.island]], face[found.covered], worst
+    kinds = (
+        face[found.measured.orientation < 0],
+        face[found.measured.mirrored[islands.island]],
+        face[found.covered],
+        worst,
+    )
     return {kind: np.unique(its) for kind, its in zip(KINDS, kinds, strict=True)}

@@ -5,7 +5,7 @@ import dataclasses
 
 import numpy as np
 
-from ..core.published import published, published_of_islands
+from ..core.published import published_of_islands
 from ..core.triangles import signed_areas
 from . import mesh_arrays
 
@@ -33,8 +33,10 @@ def add_published(outcomes, targets, options):
         plane.append(mesh.uv[corners] * np.stack([aspect, np.ones_like(aspect)], axis=-1))
         island.append(number[order])
     space, plane, island = (np.concatenate(each) for each in (space, plane, island))
-    measures = published_of_islands(space, plane, island, len(done))
+    mirrored = np.bincount(island, signed_areas(plane), len(done)) < 0
+    measures = published_of_islands(
+        space, plane * np.where(mirrored[island, None, None], (-1, 1), 1), island, len(done)
+    )
     for k, outcome in enumerate(done):
         outcome.published = measures, k
-    mirrored = np.bincount(island, signed_areas(plane), len(done)) < 0
-    return published(space, plane * np.where(mirrored[island, None, None], (-1, 1), 1))
+    return measures.whole

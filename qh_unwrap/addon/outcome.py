@@ -179,9 +179,10 @@ def error_findings(outcomes):
 def _lines(remarks):
     """A line for each kind among pairs of outcomes and texts, which names the first of those that it is said of, and
     that one."""
-    kinds = {}
+    kinds, kind_of = {}, {}
     for outcome, text in remarks:
-        kinds.setdefault(_kind(text), []).append((outcome, text))
+        kind = kind_of.get(text) or kind_of.setdefault(text, _kind(text))
+        kinds.setdefault(kind, []).append((outcome, text))
     for (first, text), *others in kinds.values():
         yield f"{len(others) + 1} islands (first: {first.name}): {text}" if others else first.sentence(text), first
 

@@ -2,6 +2,7 @@
 """What operators report of a run."""
 
 from . import cutting
+from .last_run import last_run
 from .outcome import check_summary, error_sentences, listed, sentences, summary
 
 
@@ -21,9 +22,9 @@ def tell(operator, outcomes, cuts):
 
 def tell_of_check(operator, outcomes):
     """Report what a check found; returns what the operator returns."""
-    for sentence in (*error_sentences(outcomes), *sentences(outcomes)):
+    for sentence, _ in (*last_run.errors, *last_run.lines):
         operator.report({'INFO'}, sentence)
-    clean = all(outcome.is_clean for outcome in outcomes)
+    clean = not last_run.found('LOOK')
     operator.report({'INFO'} if clean else {'WARNING'}, check_summary(outcomes))
     return {'FINISHED'}
 

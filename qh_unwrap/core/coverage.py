@@ -11,6 +11,7 @@ import numpy as np
 from .certificate import as_stored, turn
 from .layouts import pairs_within
 from .pieces import starts_of_numbers
+from .triangles import boxes_of
 
 _FEW = 200  # pairs of triangles in a box that are compared without halving it
 _FRUITFUL = 0.05  # of the triangles that are looked at by chance, those that must turn out covered for another look
@@ -101,7 +102,7 @@ class _Search:
         way = turn(*stored.swapaxes(0, 1)) if len(stored) else np.zeros(0, dtype=np.int8)
         self.corners = np.where((way < 0)[:, None, None], stored[:, ::-1], stored)
         self.group = group
-        self.low, self.high = stored.min(axis=1), stored.max(axis=1)
+        self.low, self.high = boxes_of(stored)
         self.found = np.zeros(len(stored), dtype=bool)
         self._solid = np.flatnonzero(way)
         self._random = np.random.default_rng(0)

@@ -11,7 +11,7 @@ import numpy as np
 from .certificate import are_injective, as_stored, orientation
 from .contacts import touches_along_seams_only
 from .coverage import covered
-from .distortion import Distortion, measure_corners
+from .distortion import Measured, measure_corners
 from .pieces import starts_of_numbers
 from .stepping import mapped
 from .topology import Topology
@@ -24,12 +24,8 @@ _SMALL = 64  # triangles of an island, up to which their pairs are compared at o
 class Inspection:
     """What was found, island by island (k) and triangle by triangle (t)."""
 
-    distortions: list[Distortion]
-    """Of each island."""
-    whole: Distortion
-    """Of all of them together, as if they were one."""
-    mirrored: np.ndarray
-    """(k,) bool; where an island is mirrored as a whole, its flips are counted the other way round."""
+    measured: Measured
+    """How they distort."""
     certified: np.ndarray
     """(k,) bool, the islands in which no triangle is flipped or collapsed and none lies on another, exactly."""
     overlaps_itself: np.ndarray
@@ -63,14 +59,12 @@ def inspect(
     own_uv = as_stored(uv[islands.vertex_corner])
     corners_in_space, in_map = points[islands.corners], own_uv[islands.triangles]
     scale = np.column_stack([aspect, np.ones(islands.count)])[islands.island, None]
-    distortions, mirrored = measure_corners(corners_in_space, in_map * scale, islands.island)
-    seen = np.where(mirrored[islands.island, None, None], (-1, 1), 1) * scale
-    (whole,), _ = measure_corners(corners_in_space, in_map * seen)
+    measured = measure_corners(corners_in_space, in_map * scale, islands.island)
     yield 0.2
 
-    fine = np.array([not (each.flips or each.collapsed) for each in distortions])
+    fine = np.minimum.reduceat(measured.orientation, islands.triangle_starts) > 0
     certified = fine & (np.diff(islands.triangle_starts, append=len(islands.island)) > _SMALL)
-    certified[certified] = _are_simple(islands, certified, own_uv, points, mirrored)
+    certified[certified] = _are_simple(islands, certified, own_uv, points, measured.mirrored)
     yield 0.4
     doubtful = np.flatnonzero(~certified[islands.island])
     within = yield from mapped(lambda share: 0.4 + 0.3 * share, covered(in_map[doubtful], islands.island[doubtful]))
@@ -83,9 +77,7 @@ def inspect(
     overlaps_itself = np.zeros(islands.count, dtype=bool)
     overlaps_itself[islands.island[doubtful[within.triangles]]] = True
     return Inspection(
-        distortions=distortions,
-        whole=whole,
-        mirrored=mirrored,
+        measured=measured,
         certified=fine & ~overlaps_itself,
         overlaps_itself=overlaps_itself,
         pairs=between.pairs,

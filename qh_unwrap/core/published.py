@@ -8,10 +8,12 @@ docs/checking.md has the formulas.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
-from .triangles import areas_of, by_parts, corner_angles, signed_areas
+from .pieces import starts_of_numbers
+from .triangles import areas_of, boxes_of, by_parts, corner_angles, signed_areas
 
 
 @dataclass(frozen=True)
@@ -52,78 +54,111 @@ def published(points: np.ndarray, uv: np.ndarray) -> Published | None:
 
     None where all is without area in space or in the map.
     """
-    return published_of_islands(points, uv, np.zeros(len(points), dtype=int), 1).of(0)
+    return published_of_islands(points, uv, np.zeros(len(points), dtype=int), 1).whole
 
 
 @dataclass(frozen=True, eq=False)
 class PublishedMeasures:
-    """The same of many islands: rows in the order of the fields of `Published`, NaN where there are none."""
+    """The same of many islands, and of all of them together."""
 
-    values: np.ndarray  # (9, k)
+    whole: Published | None
+    values: np.ndarray  # (9, k), rows in the order of the fields of `Published`, NaN where there are none
 
     def of(self, k: int) -> Published | None:
-        """The measures of the k-th island."""
-        row = self.values[:, k].tolist()
-        return None if np.isnan(row[0]) else Published(*row)
+        """The measures of the k-th island, as if it were the whole mesh."""
+        return _published(self.values[:, k])
 
 
 def published_of_islands(points: np.ndarray, uv: np.ndarray, island: np.ndarray, count: int) -> PublishedMeasures:
-    """The measures of each of `count` islands, whose numbers `island` (m,) ascend, as if it were the whole mesh."""
+    """The measures of each of `count` islands, whose numbers `island` (m,) ascend, and of all together."""
     points, uv = np.asarray(points, dtype=np.float64), np.asarray(uv, dtype=np.float64)
-    area, in_map = areas_of(points), np.abs(signed_areas(uv))
-    total, total_in_map = (np.bincount(island, each, count) for each in (area, in_map))
-    there = (total > 0) & (total_in_map > 0)
-    values = np.full((len(fields(Published)), count), np.nan)
-    its = (area > 0) & there[island]
-    if its.any():
-        values[:, there] = _measures(points[its], uv[its], area[its], (np.cumsum(there) - 1)[island[its]])
-    return PublishedMeasures(values)
+    its = areas_of(points) > 0
+    if not its.all():
+        points, uv, island = points[its], uv[its], island[its]
+    fields_ = _Fields.of(points, uv)
+    values = fields_.measures(island, count)
+    whole = values if count == 1 else fields_.measures(np.zeros(len(uv), dtype=int), 1)
+    return PublishedMeasures(_published(whole[:, 0]), values)
 
 
-def _measures(points, uv, area, island):
-    """The rows of measures (9, k) of islands that all have some area, of triangles that all have some in space."""
-    starts = np.searchsorted(island, np.arange(island[-1] + 1))
-    signed = signed_areas(uv)
-
-    def sums(values):
-        return np.add.reduceat(values, starts)
-
-    def largest(values):
-        return np.maximum.reduceat(values, starts)
-
-    def lowest(values):
-        return np.minimum.reduceat(values, starts)
-
-    total, total_in_map = sums(area), sums(np.abs(signed))
-    share, share_in_map = area / total[island], np.abs(signed) / total_in_map[island]
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        larger, smaller = by_parts(_stretches, points.T, uv.T)
-        width = _widths(uv, starts).max(axis=1)
-        resolution = width * largest(1 / smaller)
-        scale = np.sqrt(total / total_in_map)[island]
-        larger, smaller = larger * scale, smaller * scale
-        ratio = share_in_map / share
-        aspect = np.where(smaller > 0, larger / smaller, np.inf)
-        angles = np.abs(corner_angles(_flat(points.T).T) - corner_angles(uv)).sum(axis=1)
-        flipped = sums((signed < 0).astype(float)) / sums(np.ones(len(signed)))
-        return np.array(
-            [
-                largest(ratio + 1 / ratio) - 2,
-                sums(np.abs(share_in_map - share)),
-                largest(aspect + 1 / aspect) - 2,
-                sums(share * np.where(_has_angles(uv), angles, 6 * np.pi)),
-                lowest(smaller),
-                largest(larger),
-                np.minimum(flipped, 1 - flipped),
-                resolution,
-                sums(share * (larger**2 + smaller**2 + larger**-2 + smaller**-2)) / 2,
-            ]
-        )
+def _published(row):
+    return None if np.isnan(row[0]) else Published(*row.tolist())
 
 
-def _widths(uv, starts):
-    """The sizes (k, 2) of the boxes around islands' UVs (m, 3, 2)."""
-    return np.maximum.reduceat(uv.max(axis=1), starts) - np.minimum.reduceat(uv.min(axis=1), starts)
+class _Fields(NamedTuple):
+    """What there is to know of every triangle with some area in space, (m,) each."""
+
+    area: np.ndarray
+    signed: np.ndarray  # its area in the map
+    larger: np.ndarray  # singular values
+    smaller: np.ndarray
+    angles: np.ndarray  # the sum of the differences of its angles
+    low: np.ndarray  # (m, 2) its box in the map
+    high: np.ndarray  # (m, 2)
+
+    @classmethod
+    def of(cls, points: np.ndarray, uv: np.ndarray) -> _Fields:
+        """Those of triangles with these corners."""
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            larger, smaller, angles = by_parts(_compared, points.T, uv.T)
+        return cls(areas_of(points), signed_areas(uv), larger, smaller, angles, *boxes_of(uv))
+
+    def measures(self, island, count):
+        """The measures (9, count) of islands, NaN where one has no area in space or in the map."""
+        total, total_in_map = (np.bincount(island, each, count) for each in (self.area, np.abs(self.signed)))
+        there = (total > 0) & (total_in_map > 0)
+        values = np.full((len(fields(Published)), count), np.nan)
+        if there.all():
+            values[:] = self._measures(island, total, total_in_map)
+        elif there.any():
+            its = there[island]
+            left = _Fields(*(each[its] for each in self))
+            values[:, there] = left._measures((np.cumsum(there) - 1)[island[its]], total[there], total_in_map[there])
+        return values
+
+    def _measures(self, island, total, total_in_map):
+        """The same where all islands have some area."""
+        starts = starts_of_numbers(island, len(total))
+
+        def sums(values):
+            return np.add.reduceat(values, starts)
+
+        def largest(values):
+            return np.maximum.reduceat(values, starts)
+
+        def lowest(values):
+            return np.minimum.reduceat(values, starts)
+
+        share, share_in_map = self.area / total[island], np.abs(self.signed) / total_in_map[island]
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            width = np.max(largest(self.high) - lowest(self.low), axis=1)
+            scale = np.sqrt(total / total_in_map)[island]
+            larger, smaller = self.larger * scale, self.smaller * scale
+            ratio = share_in_map / share
+            aspect = np.where(smaller > 0, larger / smaller, np.inf)
+            flipped = sums((self.signed < 0).astype(float)) / sums(np.ones(len(island)))
+            return np.array(
+                [
+                    largest(ratio + 1 / ratio) - 2,
+                    sums(np.abs(share_in_map - share)),
+                    largest(aspect + 1 / aspect) - 2,
+                    sums(share * self.angles),
+                    lowest(smaller),
+                    largest(larger),
+                    np.minimum(flipped, 1 - flipped),
+                    width * largest(1 / self.smaller),
+                    sums(share * (larger**2 + smaller**2 + larger**-2 + smaller**-2)) / 2,
+                ]
+            )
+
+
+def _compared(points, uv):
+    """The singular values of the maps of triangles (3, 3, m) to their UVs (2, 3, m), and the sums of the differences of
+    their angles, (m,) each."""
+    flat = _flat(points)
+    same = (uv == np.roll(uv, 1, axis=1)).all(axis=0).any(axis=0)  # two corners in one place: no angles to compare
+    angles = np.abs(corner_angles(flat.T) - corner_angles(uv.T)).sum(axis=1)
+    return *_stretches(flat, uv), np.where(same, 6 * np.pi, angles)
 
 
 def _flat(points):
@@ -137,20 +172,15 @@ def _flat(points):
     return flat
 
 
-def _stretches(points, uv):
-    """The larger and the smaller singular value, (m,) each, of the maps of triangles (3, 3, m) to their UVs (2, 3, m).
+def _stretches(flat, uv):
+    """The larger and the smaller singular value, (m,) each, of the maps of triangles (2, 3, m) to their UVs (2, 3, m).
 
-    They are the halves of the sum and of the difference of the lengths of two vectors, the parts of the derivative that
-    turn and that mirror; the difference, which may cancel, is had from their product, the scale of the area.
+    The triangles are laid into the plane.  The values are the halves of the sum and of the difference of the lengths of
+    two vectors, the parts of the derivative that turn and that mirror; the difference, which may cancel, is had from
+    their product, the scale of the area.
     """
-    flat = _flat(points)
     length, along, height = flat[0, 1], flat[0, 2], flat[1, 2]
     a, b = (uv[:, 1] - uv[:, 0]) / length
     c, d = (uv[:, 2] - uv[:, 0] - along * np.array([a, b])) / height
     larger = (np.hypot(a + d, b - c) + np.hypot(a - d, b + c)) / 2
     return larger, np.abs(a * d - b * c) / np.where(larger > 0, larger, 1)
-
-
-def _has_angles(uv):
-    """Which triangles (m, 3, 2) have no two corners in one place, (m,) bool: the others have no angles to compare."""
-    return (uv != np.roll(uv, 1, axis=1)).any(axis=2).all(axis=1)

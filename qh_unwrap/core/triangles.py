@@ -71,6 +71,12 @@ def corners_of(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return corners.T
 
 
+def boxes_of(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The lower and the upper corners, (m, d) each, of the boxes around triangles (m, 3, d)."""
+    a, b, c = corners.swapaxes(0, 1)
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
 def signed_areas(corners: np.ndarray) -> np.ndarray:
     """Signed areas (m,) of plane triangles (m, 3, 2), positive counter-clockwise."""
     (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T

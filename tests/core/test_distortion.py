@@ -66,7 +66,9 @@ def test_any_uvs_are_measured_island_by_island():
         for each in ([vertices for vertices, _ in islands], maps)
     )
     island = np.repeat(np.arange(3), [len(triangles) for _, triangles in islands])
-    measured, mirrored = measure_corners(points, uv, island)
+    measured, whole, mirrored, *_ = measure_corners(points, uv, island)
+    seen = np.where(mirrored[island, None, None], (-1, 1), 1) * uv
+    assert whole.to_dict() == pytest.approx(measure_corners(points, seen).whole.to_dict(), rel=1e-9)
     assert mirrored.tolist() == [False, True, False]
     maps[1] = maps[1] * [-1, 1]
     for its, (vertices, triangles), of_map in zip(measured, islands, maps, strict=True):
@@ -82,7 +84,7 @@ def test_any_uvs_are_measured_where_nothing_hangs_together():
     uv[7] = uv[7, ::-1]
     uv[9] = uv[9, 0]
     points[11] = points[11, 0]
-    (measured,), _ = measure_corners(points, uv)
+    (measured,), *_ = measure_corners(points, uv)
     assert measured.triangle_orientation.tolist().index(-1) == 7 and measured.flips == 1
     assert measured.triangle_orientation.tolist().index(0) == 9 and measured.collapsed == 1
     assert np.isfinite(measured.l2_stretch)
@@ -90,7 +92,7 @@ def test_any_uvs_are_measured_where_nothing_hangs_together():
 
 def test_an_island_without_area_in_space_is_measured_as_nothing():
     vertices, triangles = shapes.grid(2, 2)
-    (nothing,), _ = measure_corners(np.zeros((len(triangles), 3, 3)), vertices[triangles][..., :2])
+    (nothing,), *_ = measure_corners(np.zeros((len(triangles), 3, 3)), vertices[triangles][..., :2])
     assert nothing.flips == nothing.collapsed == nothing.l2_stretch == 0
 
 

@@ -78,8 +78,8 @@ def test_a_valid_map_is_certified_and_measured():
     mesh = Mesh(vertices, triangles, result.uv[triangles.ravel()])
     found = mesh.inspected()
     assert found.certified.tolist() == [True] == [result.report.injective]
-    assert found.distortions[0].to_dict() == pytest.approx(result.report.after.to_dict(), rel=1e-5)
-    assert found.whole.l2_stretch == pytest.approx(found.distortions[0].l2_stretch)
+    assert found.measured.islands[0].to_dict() == pytest.approx(result.report.after.to_dict(), rel=1e-5)
+    assert found.measured.whole.l2_stretch == pytest.approx(found.measured.islands[0].l2_stretch)
 
 
 @pytest.mark.parametrize("size", [2, 12])  # few triangles are compared pair by pair, many by their outlines first
@@ -97,11 +97,11 @@ def test_flips_overlaps_and_collapses_are_found(size):
         else:
             mesh.uv[:, 0] *= -1
         found = mesh.inspected()
-        its = found.distortions[0]
+        its = found.measured.islands[0]
         assert (its.flips > 0) == (what in ("flip", "fold"))
         assert its.collapsed == (2 * size if what == "collapse" else 0)
         assert found.overlaps_itself[0] == found.covered.any() == (what in ("flip", "fold"))
-        assert found.certified[0] == (what == "mirror") == found.mirrored[0]
+        assert found.certified[0] == (what == "mirror") == found.measured.mirrored[0]
 
 
 def test_an_island_that_winds_over_itself_without_flips_overlaps_itself():
@@ -113,7 +113,7 @@ def test_an_island_that_winds_over_itself_without_flips_overlaps_itself():
         np.column_stack([start, start + 60, start + 61, start + 1])[:, ::-1],
     )
     found = mesh.inspected()
-    assert not found.distortions[0].flips and found.overlaps_itself[0] and not found.certified[0]
+    assert not found.measured.islands[0].flips and found.overlaps_itself[0] and not found.certified[0]
     assert 10 < found.covered.sum() < 60
 
 
@@ -159,5 +159,5 @@ def test_a_face_that_is_inside_out_is_no_flip():
 def test_lengths_are_those_of_the_image():
     mesh = quads()
     mesh.uv *= (0.5, 1)
-    assert mesh.inspected().whole.angle == pytest.approx(2)
-    assert mesh.inspected(aspect=np.array([2.0])).whole.angle == pytest.approx(1)
+    assert mesh.inspected().measured.whole.angle == pytest.approx(2)
+    assert mesh.inspected(aspect=np.array([2.0])).measured.whole.angle == pytest.approx(1)
