@@ -46,6 +46,8 @@ _NEEDS = {  # what each flag counts with, where its description does not say so
     "margin_method": "only where islands are packed",
     "margin": "only where islands are packed",
     "rotate": "only with --placement PACK",
+    "pixels_per_metre": "only with --texel-density GIVEN",
+    "image_size": "only with --texel-density GIVEN",
 }
 _CUT = (
     "never: leave closed islands as they are; needed: open what is closed or has handles along short seams; a number"

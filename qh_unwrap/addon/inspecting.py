@@ -14,7 +14,7 @@ from ..core.published import Published, published_of_islands
 from ..core.stepping import mapped
 from ..core.triangles import areas_of, boxes_of, signed_areas
 from ..core.uv_islands import uv_islands
-from . import mesh_arrays, tiles
+from . import mesh_arrays, texels, tiles
 from .joined_meshes import JoinedMeshes
 from .last_run import last_run
 from .options import MeshOptions
@@ -62,19 +62,13 @@ def check_targets(
         _number(outcomes + errors)
         _tell_of_overlaps(outcomes, found)
         yield 0.8
-        check = _measured(joined, islands, found, outcomes, unit(context))
+        check = _measured(joined, islands, found, outcomes, texels.unit(context))
     else:
         outcomes, check = [], Check(joined.face_counts, {kind: {} for kind in KINDS})
         _number(errors)
     outcomes += errors
     last_run.remember_check(outcomes, check)
     return outcomes
-
-
-def unit(context):
-    """Metres in a unit of the scene."""
-    units = context.scene.unit_settings
-    return units.scale_length if units.system != 'NONE' else 1.0
 
 
 def inspected(joined):
@@ -178,7 +172,7 @@ def _measured(joined, islands, found, outcomes, metres):
     rows = zip(outcomes, area.tolist(), pixels.tolist(), misplaced, strict=True)
     for k, (outcome, its_area, its_pixels, fault) in enumerate(rows):
         outcome.area, outcome.published = its_area, (measures, k)
-        outcome.texel_density = density(its_pixels, its_area, metres)
+        outcome.texel_density = texels.density(its_pixels, its_area, metres)
         outcome.faults += (fault,) if fault else ()
     shown = joined.pixels[slot] > 0
     return Check(
@@ -186,13 +180,8 @@ def _measured(joined, islands, found, outcomes, metres):
         {kind: joined.split(faces) for kind, faces in _faces(joined, islands, found).items()},
         found.measured.whole,
         measures.whole,
-        density(float(pixels[shown].sum()), float(area[shown].sum()), metres),
+        texels.density(float(pixels[shown].sum()), float(area[shown].sum()), metres),
     )
-
-
-def density(pixels, area, metres):
-    """Pixels along a metre, None where there are none, of an area in pixels and one in units of so many metres."""
-    return (pixels / area) ** 0.5 / metres if pixels > 0 and area > 0 else None
 
 
 def _faces(joined, islands, found):

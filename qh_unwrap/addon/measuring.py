@@ -20,9 +20,11 @@ def add_published(outcomes, targets, options):
         own.setdefault(outcome.obj, []).append((k, outcome.face_indices))
     space, plane, island = [], [], []
     for target in targets:
+        if target.obj.name not in own:
+            continue
         mesh = mesh_arrays.read(target.obj, dataclasses.replace(options, weld=False))
         numbers = np.full(len(mesh.face_start), -1)
-        for k, faces in own.get(target.obj.name, ()):
+        for k, faces in own[target.obj.name]:
             numbers[faces] = k
         number = numbers[mesh.corner_faces[mesh.corner_triangles[:, 0]]]
         order = np.flatnonzero(number >= 0)

@@ -83,10 +83,14 @@ class MeshArrays:
 
     def image_of(self, faces):
         """The image that most of the faces show."""
-        if len(set(self.images)) == 1:
-            return self.images[0]
+        return self.images[0] if len(set(self.images)) == 1 else self.images[self.slot_of(faces)]
+
+    def slot_of(self, faces):
+        """The number of the material that most of the faces have."""
+        if len(self.images) == 1:
+            return 0
         slots, counts = np.unique(self.slot[faces], return_counts=True)
-        return self.images[slots[np.argmax(counts)]]
+        return slots[np.argmax(counts)]
 
     def faces_by_image(self):
         """Yield each image, and which faces show it, (f,) bool."""

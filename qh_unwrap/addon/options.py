@@ -28,6 +28,12 @@ _MARGIN_METHOD = (
     Choice("FRACTION", "Fraction", "The margin is this part of the square, exactly; slow"),
 )
 
+_TEXEL_DENSITY = (
+    Choice("PLACED", "As Placed", "What the placement makes of it"),
+    Choice("KEEP", "Keep", "Each island keeps the density that it has; new ones get the mean of the others"),
+    Choice("GIVEN", "Given", "All islands get the pixels per metre that are given, though they may not fit the square"),
+)
+
 
 _NEEDED = Choice(
     "NEEDED",
@@ -58,6 +64,18 @@ class MeshOptions:
         0.005, "Margin", "Space around the islands that are packed", range=(0.0, 1.0), soft_range=(0.0, 0.1)
     )
     rotate: bool = setting(False, "Rotate", "Packing may turn islands by right angles; otherwise they stay as upright")
+    texel_density: str = setting(
+        "PLACED",
+        "Texel Density",
+        "How large islands are in the image; what pins or a kept boundary hold stays",
+        choices=_TEXEL_DENSITY,
+    )
+    pixels_per_metre: float = setting(
+        512.0, "Pixels per Metre", "The texel density to get", range=(1e-3, 1e7), soft_range=(1.0, 4096.0)
+    )
+    image_size: int = setting(
+        1024, "Image Size", "Pixels along a side of the image where the material has none", range=(1, 1_000_000)
+    )
     correct_aspect: bool = setting(
         True, "Correct Aspect", "Make up for an image that is not square, the one in the faces' material"
     )

@@ -104,7 +104,15 @@ class HeatProperties(_Properties, kinds=(HeatSettings,)):
 
 _FIRST = ('boundary', 'aspect', 'balance', 'iterations', 'weights')
 _SECTIONS = {
-    "Layout": ('placement', 'rotate', 'margin_method', 'margin'),
+    "Layout": (
+        'placement',
+        'rotate',
+        'margin_method',
+        'margin',
+        'texel_density',
+        'pixels_per_metre',
+        'image_size',
+    ),
     "Mesh": ('cut', 'fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data', 'weld'),
     "Advanced": ('initial', 'refine', 'repair', 'tolerance', 'tensor_power'),
 }
@@ -146,6 +154,9 @@ def _applies(owner, name):
         'rotate': placed and owner.placement == 'PACK',
         'margin': placed and owner.placement != 'UNIT',
         'margin_method': placed and owner.placement != 'UNIT',
+        'texel_density': placed,
+        'pixels_per_metre': placed and owner.texel_density == 'GIVEN',
+        'image_size': placed and owner.texel_density == 'GIVEN',
     }.get(name, True)
 
 

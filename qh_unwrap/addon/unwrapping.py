@@ -8,12 +8,12 @@ from collections.abc import Generator, Sequence
 import bpy
 import numpy as np
 
-from ..core import Settings, Shape, UnwrapError, placing, unwrap_islands
+from ..core import Settings, Shape, UnwrapError, unwrap_islands
 from ..core.course import PINS_CROSS
 from ..core.errors import BoundaryError, ClosedError, GenusError, UVError
 from ..core.islands import attached, find_islands
 from ..core.stepping import mapped
-from . import judging, layout, mesh_arrays, modes, stacking
+from . import judging, layout, mesh_arrays, modes, stacking, texels
 from .hints import hint_at_seams
 from .options import MeshOptions
 from .outcome import Outcome, count
@@ -49,6 +49,7 @@ def unwrap_targets(
             with modes.in_object_mode(context):
                 for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
                     _write(obj, list(group), cuts.get(obj))
+            texels.note(placed, context)
     return [work.outcome for work in works]
 
 
@@ -72,6 +73,7 @@ def _placed(works, options, context):
     yield _UNWRAPPING
     layout.place([work for work in works if work.uv is not None], works, options, context)
     yield _UNWRAPPING
+    _tell_of_density(works, options)
     placed = [work for work in works if work.uv is not None]
     judging.judge(placed)
     yield from mapped(lambda _: _UNWRAPPING, hint_at_seams(placed))
@@ -79,6 +81,14 @@ def _placed(works, options, context):
         rest = 1 - _UNWRAPPING
         yield from mapped(lambda share: _UNWRAPPING + rest * share, stacking.report_overlaps(placed, works, options))
     return placed
+
+
+def _tell_of_density(works, options):
+    """Warn of islands that cannot get the texel density that is given, since something of them is held."""
+    if options.texel_density == 'GIVEN':
+        for work in works:
+            if work.in_frame and work.uv is not None:
+                work.outcome.warnings += ("its texel density stays, since pins or its outline hold it",)
 
 
 def _works(target, mesh, settings):
@@ -220,9 +230,6 @@ def _write(obj, works, cut):
         return
     if cut is not None:
         _mark(cut, works)
-    areas = placing.areas([(work.vertices, work.triangles) for work in works])
-    for work, area in zip(works, areas.tolist(), strict=True):
-        work.outcome.area = area
 
 
 def _mark(cut, works):

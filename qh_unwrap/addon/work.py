@@ -31,6 +31,7 @@ class Work:
     in_frame: bool = False  # of the old UVs, because something of them is held
     has_new_seams: bool = False  # so that its old place says nothing
     cut_fault: str = ""  # why no seams were found that open it
+    scale: float | None = None  # how long a unit of its surface shall be in the new map, if that is chosen
     found_uv: np.ndarray | None = None  # (n, 2) those that the search for these seams ended with
 
     @cached_property
@@ -45,6 +46,11 @@ class Work:
     def image(self):
         """What most of its faces show: what shows the same shares the UVs."""
         return self.mesh.image_of(self.island.faces)
+
+    @cached_property
+    def picture(self):
+        """The `Picture` that most of its faces show, None for none."""
+        return self.mesh.pictures[self.mesh.slot_of(self.island.faces)]
 
     @cached_property
     def old_uv(self):
