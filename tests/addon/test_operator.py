@@ -447,8 +447,9 @@ def test_panel_passes_the_scenes_settings_to_its_button(panel):
     bpy.context.scene.qh_unwrap.boundary = 'RECTANGLE'
     layout = drawn(panel)
     assert sorted(layout.all("rows")) == sorted(field.name for field in _FIELDS)
-    ((idname, button),) = layout.all("buttons")
-    assert idname == "uv.qh_unwrap"
+    buttons = dict(layout.all("buttons"))
+    button = buttons.pop("uv.qh_unwrap")
+    assert list(buttons) == ["uv.qh_check"]
     assert vars(button) == bpy.context.scene.qh_unwrap.as_keywords()
     assert (button.iterations, button.boundary) == (3, 'RECTANGLE')
 
