@@ -211,7 +211,8 @@ class _Copies:
         islands, found = yield from inspected(joined)
         area = np.bincount(islands.island, areas_of(joined.points[islands.corners]), islands.count)
         share = area / (area.sum() or 1.0)
-        means = [np.array([getattr(its, name) for its in found.distortions]) @ share for name in MEASURES]
+        its = found.measured.islands
+        means = [np.array([getattr(each, name) for each in its]) @ share for name in MEASURES]
         face = around_faces(joined.face_start, len(joined.corner_vertex))[0][islands.corners[:, 0]]
         return Row(
             method.name,
@@ -219,9 +220,9 @@ class _Copies:
             seconds,
             "",
             *map(float, means),
-            flips=unset + sum(its.flips + its.collapsed for its in found.distortions),
+            flips=unset + sum(each.flips + each.collapsed for each in its),
             overlaps=len(np.unique(face[found.covered])),
-            curves=curves(found.distortions),
+            curves=curves(its),
         )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import bulk, mesh_arrays
+from . import bulk, mesh_arrays, texels
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,7 @@ def read(obj, view_layer):
     nothing in the file changes, and so nobody is told of a change.
     """
     shown = obj.evaluated_get(view_layer.depsgraph)
-    units = view_layer.id_data.unit_settings
-    metre = units.scale_length if units.system != 'NONE' else 1.0
+    metre = texels.unit(view_layer.id_data)
     try:
         return _read(obj, shown.to_mesh(), metre * np.array(obj.matrix_world.to_3x3()))
     finally:

@@ -55,10 +55,10 @@ def measured(shown):
     uv = uv[corners].astype(float)
     texels = np.abs(signed_areas(uv)) * np.where(shown.pixels > 0, shown.pixels, _PIXELS**2)[face]
     uv[..., 0] *= shown.aspect[face, None]
-    each, _ = measure_corners(points, uv, islands.island)
-    stretch, angle, log_area, orientation = (
-        np.concatenate([getattr(its, f"triangle_{name}") for its in each])
-        for name in ("stretch", "angle", "log_area", "orientation")
+    found = measure_corners(points, uv, islands.island)
+    stretch, angle, log_area = (
+        np.concatenate([getattr(its, f"triangle_{name}") for its in found.islands])
+        for name in ("stretch", "angle", "log_area")
     )
     sides = _outline(islands, shown, following, corner_face)
     return Heat(
@@ -66,7 +66,7 @@ def measured(shown):
         stretch=stretch,
         angle=angle,
         log_area=log_area,
-        wrong=(orientation <= 0) | ~known[corners].all(axis=1),
+        wrong=(found.orientation <= 0) | ~known[corners].all(axis=1),
         area=areas_of(points),
         texels=texels,
         face=face,

@@ -62,7 +62,7 @@ def check_targets(
         _number(outcomes + errors)
         _tell_of_overlaps(outcomes, found)
         yield 0.8
-        check = _measured(joined, islands, found, outcomes, texels.unit(context))
+        check = _measured(joined, islands, found, outcomes, texels.unit(context.scene))
     else:
         outcomes, check = [], Check(joined.face_counts, {kind: {} for kind in KINDS})
         _number(errors)

@@ -6,9 +6,9 @@ import numpy as np
 from ..core import placing
 
 
-def unit(context):
+def unit(scene):
     """Metres in a unit of the scene."""
-    units = context.scene.unit_settings
+    units = scene.unit_settings
     return units.scale_length if units.system != 'NONE' else 1.0
 
 
@@ -22,7 +22,7 @@ def note(works, context):
     if not works:
         return
     areas, in_map = _areas(works, [work.uv for work in works])
-    metres = unit(context)
+    metres = unit(context.scene)
     for work, area, its in zip(works, areas.tolist(), in_map.tolist(), strict=True):
         picture = work.picture
         work.outcome.area = area
@@ -37,7 +37,7 @@ def choose_scales(works, options, context):
     """
     if options.texel_density == 'GIVEN':
         for work in works:
-            work.scale = options.pixels_per_metre * unit(context) / _side(work, options)
+            work.scale = options.pixels_per_metre * unit(context.scene) / _side(work, options)
     elif options.texel_density == 'KEEP':
         old = [work for work in works if work.old_triangles is not None]
         if not old:
