@@ -18,6 +18,7 @@ _FRUITFUL = 0.05  # of the triangles that are looked at by chance, those that mu
 _TRIES = 0.5  # comparisons by chance for each triangle that meets a box, which always pay
 _CHEAP = 5000  # comparisons that cost no less than fewer
 _SHRINKING = 0.85  # of its pairs that halving a box must leave at most, or else it is not worth it
+_EVENLY = 0.65  # the same where a box is halved evenly, which leaves about half of them unless triangles reach far
 _SURE = 1e-15  # of the terms of a sum of products, what rounding may take of it
 
 
@@ -49,10 +50,11 @@ def covered(corners: np.ndarray, sheet: np.ndarray, group: np.ndarray | None = N
         few = work <= _FEW
         search.compare(boxes.chosen(few))
         many = boxes.chosen(~few)
-        halves = many.halved(search.low, search.high)
-        stuck = search.work(halves).reshape(-1, 2).sum(axis=1) > _SHRINKING * work[~few]
-        search.compare(many.chosen(stuck))
-        boxes = halves.chosen(np.repeat(~stuck, 2))
+        halves, stuck = search.halved(many)
+        crowded = many.chosen(stuck)
+        others, stuck = search.halved(crowded, evenly=True)
+        search.compare(crowded.chosen(stuck))
+        boxes = halves.joined(others)
     return Covered(search.found, search.pairs())
 
 
@@ -79,13 +81,28 @@ class _Boxes(NamedTuple):
         number = np.cumsum(mask) - 1
         return _Boxes(self.low[mask], self.high[mask], number[self.box[its]], self.triangle[its])
 
-    def halved(self, low: np.ndarray, high: np.ndarray) -> _Boxes:
-        """Both halves of each box, one after the other; triangles reach from `low` to `high`, (m, 2) each."""
+    def joined(self, others: _Boxes) -> _Boxes:
+        """These boxes and others."""
+        low, high = np.concatenate([self.low, others.low]), np.concatenate([self.high, others.high])
+        box = np.concatenate([self.box, others.box + len(self.low)])
+        return _Boxes(low, high, box, np.concatenate([self.triangle, others.triangle]))
+
+    def halved(self, low: np.ndarray, high: np.ndarray, evenly: bool = False) -> _Boxes:
+        """Both halves of each box, one after the other; triangles reach from `low` to `high`, (m, 2) each.
+
+        A box is cut in its middle, or `evenly`, so that as many triangles have their centres in the one half as in the
+        other: wherever in the box they crowd.
+        """
         new_low, new_high = np.repeat(self.low, 2, axis=0), np.repeat(self.high, 2, axis=0)
         rows, axis = np.arange(len(self.low)), np.argmax(self.high - self.low, axis=1)
+        its_axis = axis[self.box]
         middle = (self.low + self.high)[rows, axis] / 2
+        if evenly:
+            centre = (low + high)[self.triangle, its_axis] / 2
+            centre = np.clip(centre, self.low[self.box, its_axis], self.high[self.box, its_axis])
+            middle = centre[np.lexsort((centre, self.box))[self.starts + self.counts() // 2]]
         new_high[2 * rows, axis] = new_low[2 * rows + 1, axis] = middle
-        its_axis, its_middle = axis[self.box], middle[self.box]
+        its_middle = middle[self.box]
         in_first = low[self.triangle, its_axis] < its_middle
         in_second = high[self.triangle, its_axis] > its_middle
         in_first |= ~in_second
@@ -129,6 +146,12 @@ class _Search:
             several[some] = np.minimum.reduceat(group, first) < np.maximum.reduceat(group, first)
             left &= several
         return boxes.chosen(left)
+
+    def halved(self, boxes, evenly=False):
+        """The halves of the boxes that are worth halving, and which are not, (b,) bool."""
+        halves = boxes.halved(self.low, self.high, evenly)
+        stuck = self.work(halves).reshape(-1, 2).sum(axis=1) > (_EVENLY if evenly else _SHRINKING) * self.work(boxes)
+        return halves.chosen(np.repeat(~stuck, 2)), stuck
 
     def work(self, boxes):
         """How many pairs of triangles are left to compare in each box, (b,)."""

@@ -70,3 +70,11 @@ def test_a_tangle_takes_no_longer(way):
     start = perf_counter()
     assert found(corners).triangles.mean() > 0.4
     assert perf_counter() - start < 10
+
+
+def test_a_crowd_takes_no_longer():
+    vertices, triangles = shapes.grid(140, 140)
+    crowded = np.exp(12 * vertices[:, :2])[triangles]  # half of the triangles lie in a 400th of the width
+    start = perf_counter()
+    assert not found(crowded).triangles.any()
+    assert perf_counter() - start < 10
