@@ -184,6 +184,9 @@ def _run(args, record, progress):
     targets = [selection.Target(obj, faces(obj.data)) for obj in objects]
     targets = choice.narrowed(targets, args.material)
     objects = choice.required()
+    problem = options.use_weights and not args.check and selection.without_group(targets, options.weight_group)
+    if problem:
+        raise UsageError(problem)
     maps.make_missing(objects)
     patch = patches.Patch(args.input, objects, maps) if record.write == patches.PATCH else None
 

@@ -48,6 +48,8 @@ _NEEDS = {  # what each flag counts with, where its description does not say so
     "rotate": "only with --placement PACK",
     "pixels_per_metre": "only with --texel-density GIVEN",
     "image_size": "only with --texel-density GIVEN",
+    "weight_group": "only with --use-weights",
+    "weight_factor": "only with --use-weights",
 }
 _CUT = (
     "never: leave closed islands as they are; needed: open what is closed or has handles along short seams; a number"
@@ -172,7 +174,7 @@ def _help(field):
     elif meta["choices"]:
         notes.append(f"default {default}")
     elif type(default) is str:
-        notes.append("default none")
+        notes.append(f"default {default or 'none'}")
     else:
         low, high = meta["range"]
         notes.append(f"{low:g} to {high:g}, default {default:g}")

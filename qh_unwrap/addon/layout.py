@@ -6,6 +6,7 @@ import itertools
 import numpy as np
 
 from ..core import UnwrapError, placing
+from ..core.triangles import areas_in_space
 from . import packing, texels
 
 _SLACK = 1e-5  # of the square, by which islands may reach over its border
@@ -86,7 +87,8 @@ def _pack(works, options, nested, context):
     if not works:
         return
     works = sorted(works, key=lambda work: work.aspect[0])
-    uvs, enlarged = placing.to_scale([(work.uv, work.vertices, work.triangles) for work in works])
+    islands = [(work.uv, work.vertices, work.triangles) for work in works]
+    uvs, enlarged = placing.to_scale(islands, _importance(works))
     scaled = works[0].scale is not None  # as then all of them are
     if scaled:
         for work, uv in zip(works, uvs, strict=True):
@@ -112,6 +114,20 @@ def _pack(works, options, nested, context):
             work.outcome.warnings += ("beside the others it would vanish: packed larger than its share",)
     if scaled:
         _resize_together([work for work in works if work.uv is not None])
+
+
+def _importance(works):
+    """How important the works are in the mean over their surface, (k,), None if all are alike."""
+    if all(work.importance is None for work in works):
+        return None
+    return np.array(
+        [
+            1.0
+            if work.importance is None
+            else np.average(work.importance, weights=areas_in_space(work.vertices, work.triangles))
+            for work in works
+        ]
+    )
 
 
 def _resize_together(works):

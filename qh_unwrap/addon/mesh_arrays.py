@@ -43,6 +43,7 @@ class MeshArrays:
     images: tuple[str, ...]  # what each of the materials shows, the same for what shares its UVs
     pictures: tuple["Picture | None", ...]  # the image itself of each material, None for those without one
     welded_edge: np.ndarray | None = None  # (e,) the edge that each counts as, None if nothing shall be welded
+    importance: np.ndarray | None = None  # (n,) its logarithm at the vertices, None if all are alike
     wishes: Wishes | None = None  # where seams are welcome, if somebody asks
 
     @cached_property
@@ -160,6 +161,7 @@ def _read(obj, mesh, uv_name, options, vertex_group):
         images=images,
         pictures=pictures,
         welded_edge=welded_edge,
+        importance=_importance(obj, mesh, options),
         wishes=None if vertex_group is None else _wishes(obj, mesh, vertex_group, corner_edge, face_start),
     )
 
@@ -172,6 +174,12 @@ def _wishes(obj, mesh, vertex_group, corner_edge, face_start):
     np.minimum.at(lowest, corner_edge, material)
     np.maximum.at(highest, corner_edge, material)
     return Wishes(marked=marked | (lowest < highest), spared=_weights(obj, mesh, vertex_group))
+
+
+def _importance(obj, mesh, options):
+    """The logarithms of the importance of the vertices, None if nobody asks or there is no such group."""
+    weights = _weights(obj, mesh, options.weight_group) if options.use_weights else None
+    return None if weights is None else weights * np.log(options.weight_factor)
 
 
 def _weights(obj, mesh, name):

@@ -33,8 +33,8 @@ class QH_OT_unwrap(OnSelectedFaces, properties.OperatorProperties, bpy.types.Ope
     bl_label = "Quasi-Harmonic Unwrap"
     bl_options = {'REGISTER', 'UNDO'}
 
-    def draw(self, _context):
-        properties.draw(self.layout, self)
+    def draw(self, context):
+        properties.draw(self.layout, self, context.object)
 
     def invoke(self, context, event):
         """From a menu: with the panel's settings.  Scripts come to `execute`, with the defaults."""
@@ -51,6 +51,10 @@ class QH_OT_unwrap(OnSelectedFaces, properties.OperatorProperties, bpy.types.Ope
             settings.check_together()
         except SettingsError as error:
             self.report({'ERROR'}, str(error))
+            return None
+        problem = options.use_weights and selection.without_group(targets, options.weight_group)
+        if problem:
+            self.report({'ERROR'}, problem)
             return None
         seams = context.scene.qh_seams
         return jobs.cut_and_unwrap(targets, settings, options, context, seams.seam_settings(), seams.seam_options())

@@ -90,6 +90,17 @@ class MeshOptions:
         "Unwrap the mesh as its Subdivision Surface modifier smooths it; the modifier may stand anywhere, others do"
         " not count",
     )
+    use_weights: bool = setting(
+        False, "Importance Weights", "Give the regions of a vertex group more room in the map, and so more texels"
+    )
+    weight_group: str = setting("uv_importance", "Weight Group", "The vertex group with the importance weights")
+    weight_factor: float = setting(
+        4.0,
+        "Weight Factor",
+        "How many times as large faces of weight 1 become as those of weight 0; 1 changes nothing",
+        range=(1e-3, 1e4),
+        soft_range=(0.1, 10.0),
+    )
     weld: bool = setting(
         False,
         "Weld",

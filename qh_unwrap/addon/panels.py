@@ -47,7 +47,7 @@ class _Panel:
         row.operator("uv.qh_check", icon='VIEWZOOM')
         if context.mode == 'EDIT_MESH':
             row.operator("uv.qh_check", text="", icon='RESTRICT_SELECT_OFF').only_selected = True
-        properties.draw(layout.column(), settings)
+        properties.draw(layout.column(), settings, context.object)
 
 
 class _SeamPanel:

@@ -113,13 +113,23 @@ _SECTIONS = {
         'pixels_per_metre',
         'image_size',
     ),
-    "Mesh": ('cut', 'fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data', 'weld'),
+    "Mesh": (
+        'cut',
+        'fill_holes',
+        'correct_aspect',
+        'correct_scale',
+        'use_subsurf_data',
+        'weld',
+        'use_weights',
+        'weight_group',
+        'weight_factor',
+    ),
     "Advanced": ('initial', 'refine', 'repair', 'tolerance', 'tensor_power'),
 }
 
 
-def draw(layout, owner):
-    """A row for each property, the rarer ones in sections that fold; what does not apply is greyed out."""
+def draw(layout, owner, obj=None):
+    """A row for each property, the rarer ones in sections that fold; what does not apply is grey or not shown."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     _draw_rows(layout, owner, _FIRST)
@@ -127,16 +137,26 @@ def draw(layout, owner):
         header, body = layout.panel(f"qh_unwrap_{title.lower()}", default_closed=title != "Layout")
         header.label(text=title)
         if body:
-            _draw_rows(body, owner, names)
+            _draw_rows(body, owner, names, obj)
 
 
-def _draw_rows(layout, owner, names):
+def _draw_rows(layout, owner, names, obj=None):
+    shown = {
+        'aspect': owner.boundary == 'RECTANGLE',
+        'pixels_per_metre': owner.texel_density == 'GIVEN',
+        'image_size': owner.texel_density == 'GIVEN',
+        'weight_group': owner.use_weights,
+        'weight_factor': owner.use_weights,
+    }
     for name in names:
-        if name == 'aspect' and owner.boundary != 'RECTANGLE':
+        if not shown.get(name, True):
             continue
         row = layout.row()
         row.active = _applies(owner, name)
-        row.prop(owner, name)
+        if name == 'weight_group' and obj is not None and obj.type == 'MESH':
+            row.prop_search(owner, name, obj, "vertex_groups")
+        else:
+            row.prop(owner, name)
 
 
 def _applies(owner, name):
@@ -155,8 +175,8 @@ def _applies(owner, name):
         'margin': placed and owner.placement != 'UNIT',
         'margin_method': placed and owner.placement != 'UNIT',
         'texel_density': placed,
-        'pixels_per_metre': placed and owner.texel_density == 'GIVEN',
-        'image_size': placed and owner.texel_density == 'GIVEN',
+        'pixels_per_metre': placed,
+        'image_size': placed,
     }.get(name, True)
 
 

@@ -74,6 +74,13 @@ def visible_faces(mesh):
     return ~hidden
 
 
+def without_group(targets, name):
+    """Why none of the targets has the vertex group, and the cure; nothing if one has it."""
+    if any(target.obj.vertex_groups.get(name) for target in targets):
+        return ""
+    return f"There is no vertex group {name}: paint one, choose another, or turn the importance weights off"
+
+
 def all_faces(mesh):
     return np.ones(len(mesh.polygons), dtype=bool)
 

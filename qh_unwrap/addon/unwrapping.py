@@ -147,7 +147,7 @@ def _shape(work):
     if work.found_uv is not None and settings.boundary == 'FREE' and settings.initial == 'AUTO' and not pinned.any():
         # A start that is valid: another one may not lead to a map that is.
         settings = dataclasses.replace(settings, initial='CURRENT', iterations=0)
-        return settings, Shape(work.vertices, work.triangles, work.found_uv, face=work.triangle_faces)
+        return settings, _made_shape(work, work.found_uv)
     if work.is_attached:
         if settings.boundary == 'FREE':
             pinned = pinned | work.attached_vertices
@@ -166,7 +166,12 @@ def _shape(work):
             raise UVError(text + (_HANGS if work.is_attached else ""))
         uv = None
     pinned = pinned if pinned.any() else None
-    return settings, Shape(work.vertices, work.triangles, uv, pinned, face=work.triangle_faces)
+    return settings, _made_shape(work, uv, pinned)
+
+
+def _made_shape(work, uv, pinned=None):
+    its = dict(face=work.triangle_faces, importance=work.importance)
+    return Shape(work.vertices, work.triangles, uv, pinned, **its)
 
 
 def _without_uvs(settings):

@@ -112,6 +112,13 @@ class Work:
     def vertices(self):
         return self.mesh.vertices[self.island.vertices]
 
+    @cached_property
+    def importance(self):
+        """(t,) how many times as large each triangle shall be as one without weights, None if all shall be alike."""
+        if self.mesh.importance is None:
+            return None
+        return np.exp(self.mesh.importance[self.island.vertices][self.triangles].mean(axis=1))
+
     @property
     def polygons(self):
         """The mesh with this island alone as what is to be unwrapped."""

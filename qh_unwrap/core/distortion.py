@@ -51,8 +51,8 @@ def measure(surface: Surface, uv: np.ndarray) -> Distortion:
 
 
 def measure_pieces(chart: Chart, uv: np.ndarray) -> list[Distortion]:
-    """The `Distortion` of every piece's map."""
-    return _by_pieces(chart, *_fields(chart, uv))
+    """The `Distortion` of every piece's map, beside the shapes that triangles have in space."""
+    return _by_pieces(chart.in_space, *_fields(chart.in_space, uv))
 
 
 def _fields(chart, uv):

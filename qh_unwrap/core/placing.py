@@ -128,15 +128,20 @@ def in_unit_square(uv: np.ndarray) -> np.ndarray:
 
 
 def to_scale(
-    islands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    islands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], importance: np.ndarray | None = None
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """The UVs of islands, each given as (uv, vertices, triangles), scaled to the same texel density and about the area
-    1 all together; and which, (k,) bool, are larger, since single precision could not tell their vertices apart."""
+    1 all together; and which, (k,) bool, are larger, since single precision could not tell their vertices apart.
+
+    `importance` (k,) is what the islands' areas count times, by default 1.
+    """
     uvs, vertices, triangles = (list(each) for each in zip(*islands, strict=True))
     in_space, in_layout = (
         areas(list(zip(vertices, triangles, strict=True))),
         uv_areas(list(zip(uvs, triangles, strict=True))),
     )
+    if importance is not None:
+        in_space = in_space * importance
     share = in_space / in_space.sum()
     least = _FINEST**2 * np.array([len(each) for each in triangles])
     scale = np.sqrt(np.maximum(share, least) / np.maximum(in_layout, 1e-300))

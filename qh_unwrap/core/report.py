@@ -23,6 +23,7 @@ class Shape:
     partner    (n, 2) int, for U and V of every vertex the vertex that it keeps its distance from, itself for nobody
                (boundary FREE or KEEP, with `uv`)
     face       (m,) int, the polygon that each triangle is a part of, where warnings are to speak of polygons
+    importance (m,), positive: how many times as large each triangle shall be in the map as one of importance 1
     """
 
     vertices: np.ndarray
@@ -31,6 +32,7 @@ class Shape:
     pinned: np.ndarray | None = None
     partner: np.ndarray | None = None
     face: np.ndarray | None = None
+    importance: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
