@@ -45,6 +45,10 @@ class _Comparing(OnSelectedFaces):
         except SettingsError as error:
             self.report({'ERROR'}, str(error))
             return None
+        problem = options.use_weights and selection.without_group(targets, options.weight_group)
+        if problem:
+            self.report({'ERROR'}, problem)
+            return None
         blenders = self.methods == 'BLENDER'
         methods = comparing.blenders(settings, options) if blenders else comparing.of_figure_11(options)
         return comparing.compare(targets, methods, context, options)

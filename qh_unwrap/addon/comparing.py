@@ -106,7 +106,7 @@ def _natively(identifier, options):
                 use_subsurf_data=options.use_subsurf_data,
                 margin_method=options.margin_method,
                 margin=options.margin,
-                **_STRETCHED if identifier == 'MINIMUM_STRETCH' else {},
+                **_stretched(options) if identifier == 'MINIMUM_STRETCH' else {},
             )
             seconds = perf_counter() - begun
             bpy.ops.object.mode_set(mode='OBJECT')
@@ -115,7 +115,10 @@ def _natively(identifier, options):
     return unwrap
 
 
-_STRETCHED = dict(no_flip=False, iterations=10, use_weights=False)  # as Blender has it at first
+def _stretched(options):
+    """What Minimum Stretch has beside the others' options, as Blender has it at first; but the weights are ours."""
+    names = ("use_weights", "weight_group", "weight_factor")
+    return dict(no_flip=False, iterations=10) | {name: getattr(options, name) for name in names}
 
 
 def _by_us(settings, options):
@@ -195,6 +198,9 @@ class _Copies:
         obj.constraints.clear()
         obj.parent, obj.data = None, mesh
         obj.matrix_world = place
+        for group in self._originals[k].vertex_groups:  # whose names are the mesh's
+            if group.name not in obj.vertex_groups:
+                obj.vertex_groups.new(name=group.name)
         obj.hide_viewport = obj.hide_select = False
         scene.collection.objects.link(obj)
         view_layer = scene.view_layers[0]

@@ -131,6 +131,21 @@ def test_only_selected_faces_count_and_their_seams_stay():
     assert row.angle < 1.05 and row.error == ""  # each face for itself is nearly a square
 
 
+def test_importance_counts_for_ours_and_for_minimum_stretch():
+    obj = add_grid(8)
+    obj.vertex_groups.new(name="other")
+    group = obj.vertex_groups.new(name="uv_importance")
+    group.add([vertex.index for vertex in obj.data.vertices if vertex.co.x < 0], 1.0, 'REPLACE')
+    weighted = MeshOptions(use_weights=True, weight_factor=4.0)
+    for name in {"QH Unwrap", "Minimum Stretch"} & {*NATIVE, "QH Unwrap"}:
+        plain, its = (compare(options=options)[name] for options in (OPTIONS, weighted))
+        assert its.area > plain.area + 0.3, name
+    with pytest.raises(RuntimeError, match="missing"):
+        bpy.context.scene.qh_unwrap.use_weights = True
+        bpy.context.scene.qh_unwrap.weight_group = "missing"
+        bpy.ops.uv.qh_compare()
+
+
 def test_flips_and_overlaps_are_counted():
     obj = add_grid(4)
     corners = [obj.data.polygons[face].loop_indices for face in (0, 15)]

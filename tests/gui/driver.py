@@ -360,7 +360,7 @@ def _end(gui):
 
 def _is_running(gui):
     running = {operator.bl_idname for operator in gui.window.modal_operators}
-    return bool(running & {"UV_OT_qh_unwrap", "UV_OT_qh_seams", "UV_OT_qh_check"})
+    return bool(running & {"UV_OT_qh_unwrap", "UV_OT_qh_seams", "UV_OT_qh_check", "UV_OT_qh_compare", "UV_OT_qh_plot"})
 
 
 def _sheet(size):
