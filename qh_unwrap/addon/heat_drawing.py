@@ -122,10 +122,9 @@ def _draw_lines(entry, name, ends, width):
 
 
 def _batch(kind, shader, **arrays):
-    buffer = gpu.types.GPUVertBuf(gpu.shader.from_builtin(shader).format_calc(), len(arrays["pos"]))
-    for name, values in arrays.items():
-        buffer.attr_fill(name, np.ascontiguousarray(values, dtype=np.float32))
-    return gpu.types.GPUBatch(type=kind, buf=buffer)
+    """What the graphics card gets of arrays, which it takes as they are."""
+    content = {name: np.ascontiguousarray(values, dtype=np.float32) for name, values in arrays.items()}
+    return batch_for_shader(gpu.shader.from_builtin(shader), kind, content)
 
 
 def _model(entry, opacity):

@@ -36,6 +36,7 @@ def _menus(gui):
     gui.shot("1_menu_view_3d.png")
     gui.key("q")
     yield 2
+    yield from _end(gui)
     assert not np.array_equal(_uvs(), before), "the menu entry did nothing"
     gui.shot("2_report.png")
     yield from _redo(gui, "3_redo_panel.png")
@@ -98,6 +99,8 @@ def _sidebars(gui):
     yield 1
     gui.click(*_button(gui, 'IMAGE_EDITOR', _BUTTONS["Unwrap"]))
     yield 2
+    yield from _end(gui)
+    yield 1
     gui.shot("10_packed_by_the_button.png")
     assert not np.array_equal(_uvs(), before), "the button did nothing"
     assert _uvs().min() >= 0 and _uvs().max() <= 1, "not packed: ESC, pressed before, stops Blender's packer"
