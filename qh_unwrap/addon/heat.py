@@ -130,7 +130,7 @@ def _logarithms(heat, quantity, mean):
 
 
 def _mean(heats, quantity):
-    """Over the whole surface, what is ideal: texels along a meter, from areas; 1 for the ratios."""
+    """Over the whole surface, what is ideal: texels along a metre, from areas; 1 for the ratios."""
     area = sum(heat.area.sum() for heat in heats)
     if quantity != 'DENSITY':
         return 1.0
@@ -200,7 +200,7 @@ def _meaning(quantity, limit, mean):
         yield f"Red: 1/{limit:.4g} of its share of the image, or less"
         yield f"Blue: {limit:.4g} times its share, or more"
     else:
-        yield f"Red: {_rounded(mean / limit)} pixels per meter, or fewer"
+        yield f"Red: {_rounded(mean / limit)} pixels per metre, or fewer"
         yield f"Blue: {_rounded(mean * limit)}, or more; the mean is {_rounded(mean)}"
 
 

@@ -73,7 +73,7 @@ def _visible(heatmap, context):
 
 
 def _is_visible(obj, space):
-    return obj.visible_in_viewport_get(space) if space.type == 'VIEW_3D' else obj.visible_get()
+    return obj.visible_get(viewport=space) if space.type == 'VIEW_3D' else obj.visible_get()
 
 
 def _pulled(projection, by):

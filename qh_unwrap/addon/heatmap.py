@@ -82,7 +82,7 @@ class Heatmap:
         for entry in self.entries:
             obj = entry.find() if entry.is_stale else None
             layer = next((each for each in layers if obj is not None and obj.name in each.objects), None)
-            if layer is None:
+            if layer is None or obj.type != 'MESH':  # it may have been converted
                 continue
             layer.update()
             shown = evaluated.read(obj, layer)

@@ -141,7 +141,7 @@ _QUANTITY = (
     Choice(
         "DENSITY",
         "Texel Density",
-        "Pixels of the material's image along a meter, compared with all that is shown; as if there were one of 1024"
+        "Pixels of the material's image along a metre, compared with all that is shown; as if there were one of 1024"
         " pixels where there is none",
     ),
 )
