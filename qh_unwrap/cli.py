@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line: `qh-unwrap`, `python -m qh_unwrap` and `blender --command qh_unwrap`; and the same for Python.
 
-Exit codes: 0 everything unwrapped, 1 something failed (the rest is written), 2 wrong usage, 3 nothing could be written;
-130 and 143 after SIGINT and SIGTERM.
+Exit codes: 0 everything unwrapped, or no fault found; 1 something failed (the rest is written), or faults found;
+2 wrong usage; 3 nothing could be done; 130 and 143 after SIGINT and SIGTERM.
 """
 
 import argparse
@@ -12,7 +12,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from . import console, flags, single
+from . import asked, console, flags, single
 from .addon import stopping
 from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
 from .addon.failures import FileError, UsageError
@@ -109,7 +109,7 @@ def unwrap_file(path, output=None, **options):
                 value = flags.cut(value)
             except argparse.ArgumentTypeError as error:
                 raise UsageError(f"cut: {error}") from None
-        elif name in ("json", "preview") and value is not None:
+        elif name in ("json", "preview", "plot") and value is not None:
             value = Path(value)
         elif isinstance(value, str) and isinstance(known[name], str) and known[name]:  # a choice, and no free name
             value = value.upper()
@@ -137,7 +137,7 @@ def _understood(argv):
         args, others = parser.parse_known_args(argv)
     except UsageError:
         args, others = parser.parse_args([]), []
-    if args.json and any(single.is_same(args.json, each.partition("=")[2] or each) for each in others):
+    if args.json and any(asked.is_same(args.json, each.partition("=")[2] or each) for each in others):
         args.json = None  # it names the input, or another file
     return args
 

@@ -10,7 +10,7 @@ from .addon import outcome as words
 _MANY = 50  # islands: with more of them, the table has a row for each object
 _PATIENCE = 2.0  # seconds without a bar
 _WIDTH = 30  # of the bar
-_HEAD = ("island", "faces", "stretch", "sym. Dirichlet", "angle", "area", "flips", "iterations")
+_HEAD = ("island", "faces", "stretch", "sym. Dirichlet", "angle", "area", "flips")
 _MEASURES = ("l2_stretch", "symmetric_dirichlet", "angle", "area")
 
 
@@ -24,7 +24,7 @@ def show(text, *, error=False):
         try:
             text.encode(encoding)
         except UnicodeEncodeError:
-            text = text.replace("→", "->").encode(encoding, "replace").decode(encoding)
+            text = text.replace("→", "->").replace("–", "-").encode(encoding, "replace").decode(encoding)
         print(text, file=stream, flush=True)
     except (OSError, ValueError):  # a closed pipe, a full disk, a closed stream
         _silence(stream)
@@ -54,15 +54,16 @@ def show_outcomes(outcomes, skipped, *, verbose=False, quiet=False):
 
 
 def _table(outcomes, by_object):
+    last = "pixels per metre" if outcomes[0].is_check else "iterations"
     if by_object:
         groups = {}
         for outcome in outcomes:
             groups.setdefault(outcome.obj, []).append(outcome)
-        head = ("object", "islands", *_HEAD[1:])
+        head = ("object", "islands", *_HEAD[1:], last)
         rows = [(name, str(len(group)), *_numbers(group)) for name, group in groups.items()]
         total = ("total", str(len(outcomes)), *_numbers(outcomes))
     else:
-        head = _HEAD
+        head = (*_HEAD, last)
         rows = [(f"{outcome.obj} {outcome.number}", *_numbers([outcome])) for outcome in outcomes]
         total = ("total", *_numbers(outcomes))
     rows = [head, *rows, *([total] if len(outcomes) > 1 else [])]
@@ -73,12 +74,14 @@ def _table(outcomes, by_object):
 
 
 def _numbers(outcomes):
-    """What a row says of one island or of several: sums, means over the surface, and the most iterations."""
+    """What a row says of one island or of several: sums, means over the surface, and the most iterations, or of a check
+    the texel density."""
+    is_check = outcomes[0].is_check
     return (
         str(sum(outcome.faces for outcome in outcomes)),
         *(words.mean_change(outcomes, name) for name in _MEASURES),
         str(sum(outcome.after.flips for outcome in outcomes)),
-        str(max(outcome.iterations for outcome in outcomes)),
+        words.shown_density(outcomes) if is_check else str(max(outcome.iterations for outcome in outcomes)),
     )
 
 

@@ -32,12 +32,14 @@ examples:
       keep the outlines of the UVs that there are, and even out what is in them
   qh-unwrap model.obj --boundary CIRCLE --balance 0.5 --refine 0 --preview picture.png
       look at the published map, and write nothing else
+  qh-unwrap --check model.glb --json report.json
+      check the UVs that are there, and change nothing
 
 exit codes:
-  0  everything is unwrapped
-  1  some islands failed, or with --strict are not certified; the rest is written
+  0  everything is unwrapped; with --check, no fault was found
+  1  some islands failed, or with --strict are not certified; the rest is written; with --check, faults were found
   2  wrong usage
-  3  nothing could be written: nothing was unwrapped, or a file could not be read or written
+  3  nothing could be done: nothing was unwrapped, or a file could not be read or written
   130, 143  stopped by Ctrl C or SIGTERM; nothing half done is left
 with -O FOLDER: 0 if every file ends with 0, else 1 if some were written, 3 if none was
 
@@ -53,6 +55,10 @@ _NEEDS = {  # what each flag counts with, where its description does not say so
     "margin_method": "only where islands are packed",
     "margin": "only where islands are packed",
     "rotate": "only with --placement PACK",
+    "pixels_per_metre": "only with --texel-density GIVEN",
+    "image_size": "only with --texel-density GIVEN",
+    "weight_group": "only with --use-weights",
+    "weight_factor": "only with --use-weights",
 }
 _CUT = (
     "never: leave closed islands as they are; needed: open what is closed or has handles along short seams; a number"
@@ -75,6 +81,11 @@ def parser():
     )
     made.add_argument("input", metavar="INPUT", nargs="*", help=_INPUT)
     made.add_argument("-o", "--output", type=Path, help="file to write, in any of these formats except .stl")
+    made.add_argument(
+        "--check",
+        action="store_true",
+        help="unwrap nothing: say what there is to say of the UVs in the file; exits with 1 if there are faults",
+    )
     made.add_argument("--object", action="append", metavar="NAME", help="unwrap this object only; may be repeated")
     made.add_argument("--seams-from-islands", action="store_true", help="first mark the cuts of the old UVs as seams")
     made.add_argument(
@@ -105,6 +116,12 @@ def parser():
     )
     made.add_argument(
         "--preview", type=Path, metavar="FILE", help="draw the model and its UVs, checkered, into a .png or .jpg file"
+    )
+    made.add_argument(
+        "--plot",
+        type=Path,
+        metavar="FILE",
+        help="plot the distortion of every triangle, beside that of Blender's own methods, into a .png or .svg file",
     )
     made.add_argument(
         "--write",
@@ -240,7 +257,7 @@ def _help(field):
     elif meta["choices"]:
         notes.append(f"default {default}")
     elif type(default) is str:
-        notes.append("default none")
+        notes.append(f"default {default or 'none'}")
     else:
         low, high = meta["range"]
         notes.append(f"{low:g} to {high:g}, default {default:g}")

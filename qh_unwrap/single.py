@@ -3,14 +3,14 @@
 
 import dataclasses
 import json
-import os
 import traceback
 from contextlib import contextmanager
-from pathlib import Path
 
+from . import asked
 from .addon import stopping, streams, suffixes, writing
 from .addon.document import FAILED, OK, PARTIAL, USAGE, Record
 from .addon.failures import NO_BLENDER, FileError, UsageError
+from .addon.last_run import last_run
 from .addon.options import MeshOptions, SeamOptions
 from .core import Settings, UnwrapError
 from .core.relax_settings import RelaxSettings
@@ -51,7 +51,7 @@ def finish(args, record):
 def _run(args, record, progress):
     record.input, record.output = str(args.input), str(args.output) if args.output else None
     record.strict = bool(args.strict)
-    _check_paths(args)
+    asked.check_paths(args)
     settings, options, seam_settings, seam_options, relax_settings = settings_of(args)
     values = dataclasses.asdict(relax_settings if args.relax else settings) | dataclasses.asdict(options)
     if options.cut != 'NEVER' and not args.relax:
@@ -62,10 +62,21 @@ def _run(args, record, progress):
             import bpy
         except ImportError:
             raise UsageError(NO_BLENDER) from None
-        from .addon import choosing, files, jobs, patches, preview, selection
+        from .addon import (
+            choosing,
+            files,
+            inspecting,
+            jobs,
+            measuring,
+            patches,
+            plotting,
+            preview,
+            selection,
+            uv_selection,
+        )
     record.blender = bpy.app.version_string
 
-    _check_formats(args, preview)
+    asked.check_formats(args, preview, plotting)
     record.write = patches.mode(args.write, args.input, args.output)
     _keep(args, record)  # which says that the run is not finished, in place of what an earlier one said
     record.begin("read")
@@ -76,13 +87,17 @@ def _run(args, record, progress):
     record.skipped = choice.skipped
     objects = choice.required()
     maps = choosing.Maps(objects, args.uv_map, args.texcoord)
-    _check_room(args, objects, files)
-    record.begin("unwrap")
+    asked.check_room(args, objects, files)
+    record.begin("check" if args.check else "unwrap")
     if args.seams_from_islands:
         files.mark_cuts(objects, options)
-    targets = [selection.Target(obj, selection.visible_faces(obj.data)) for obj in objects]
+    faces = selection.all_faces if args.check else selection.visible_faces
+    targets = [selection.Target(obj, faces(obj.data)) for obj in objects]
     targets = choice.narrowed(targets, args.material)
     objects = choice.required()
+    problem = options.use_weights and not args.check and selection.without_group(targets, options.weight_group)
+    if problem:
+        raise UsageError(problem)
     maps.make_missing(objects)
     patch = patches.Patch(args.input, objects, maps) if record.write == patches.PATCH else None
 
@@ -92,21 +107,30 @@ def _run(args, record, progress):
             progress(share)
 
     with streams.quiet():
-        if args.relax:
-            steps = jobs.relax(targets, relax_settings, options, bpy.context)
+        if args.check:
+            outcomes, cuts = finished(mapped(step, inspecting.check_targets(targets, bpy.context, options))), []
+            record.check, record.published = last_run.check.to_dict(), last_run.check.published
         else:
-            steps = jobs.cut_and_unwrap(targets, settings, options, bpy.context, seam_settings, seam_options)
-        outcomes, cuts = finished(mapped(step, steps))
+            if args.relax:
+                chosen = [(target.obj, uv_selection.of_faces(target.obj, target.faces)) for target in targets]
+                steps = jobs.relax(chosen, relax_settings, options, bpy.context)
+            else:
+                steps = jobs.cut_and_unwrap(targets, settings, options, bpy.context, seam_settings, seam_options)
+            outcomes, cuts = finished(mapped(step, steps))
+            record.published = measuring.add_published(outcomes, targets, options)
     record.cuts = [cut.to_dict() for cut in cuts if cut.new.any()]
     record.outcomes, record.places = outcomes, choosing.places(outcomes, objects)
+    if args.check:
+        record.judge()
+        return
     record.begin("write")
     if record.done:
-        _write(args, record, maps, targets, options, patch)
+        _write(args, record, maps, targets, settings, options, patch)
     record.judge()
 
 
-def _write(args, record, maps, targets, options, patch):
-    from .addon import checking, files, losses, preview
+def _write(args, record, maps, targets, settings, options, patch):
+    from .addon import checking, files, losses, plotting, preview
 
     named = {outcome.obj for outcome in record.done}
     done = {target.obj for target in targets if target.obj.name in named}
@@ -119,6 +143,9 @@ def _write(args, record, maps, targets, options, patch):
         if args.preview:
             with _at_file("write", args.preview, record):
                 staging.write(args.preview, draw, checking.check_image)
+        if args.plot:
+            with _at_file("write", args.plot, record):
+                staging.write(args.plot, lambda path: _plot(path, targets, settings, options), plotting.check)
         if args.output:
             with _at_file("write", args.output, record):
                 is_patched = patch and _patch(args, record, patch, staging)
@@ -129,10 +156,23 @@ def _write(args, record, maps, targets, options, patch):
                 with _at_file("write", args.output, record):
                     files.stage(staging, args.output)
         try:
-            with _at_file("write", args.output or args.preview, record):
+            with _at_file("write", args.output or args.preview or args.plot, record):
                 staging.put_in_place()
         finally:
             record.files = staging.placed
+
+
+def _plot(path, targets, settings, options):
+    """Plot what became of the targets beside what Blender's own methods make of copies of them."""
+    import bpy
+
+    from .addon import comparing, plotting
+
+    methods = comparing.blenders(settings, options, current=False, ours=False)
+    comparison = finished(comparing.compare(targets, methods, bpy.context, options))
+    if comparison.figure is None:
+        raise FileError(f"there is nothing to plot, {comparison.remarks[0]}")
+    plotting.write(comparison.figure, path)
 
 
 def _patch(args, record, patch, staging):
@@ -160,11 +200,6 @@ def _keep(args, record):
     except (OSError, FileError) as error:
         raise FileError(f"cannot write {args.json}: {error}") from error
     record.is_kept = True
-
-
-def is_same(one, other):
-    """Whether two paths lead to one file."""
-    return os.path.realpath(one) == os.path.realpath(other)
 
 
 @contextmanager
@@ -204,50 +239,3 @@ def settings_of(args):
 def _made_from(given, kind):
     names = [field.name for field in dataclasses.fields(kind)]
     return kind(**{name: given[name] for name in names if name in given})
-
-
-def _check_paths(args):
-    """Raise `UsageError` where the files cannot be meant, before anything is written, the report included."""
-    if args.input != "suzanne":
-        args.input = Path(args.input)
-        if args.json and is_same(args.json, args.input):
-            args.json = None
-            raise UsageError(f"--json would replace the input {args.input}: choose another name")
-        if not args.input.is_file():
-            raise UsageError(f"there is no file {args.input}")
-    report = args.json if str(args.json) != "-" else None
-    places = {}
-    sibling = suffixes.sibling(args.output) if args.output and args.write != "patch" else None
-    for path in filter(None, (args.output, sibling, report, args.preview)):
-        place = os.path.realpath(path)
-        if place in places:
-            args.json = None
-            raise UsageError(f"{path} is asked for twice: choose another name")
-        places[place] = path
-    for path in places.values():
-        if not path.absolute().parent.is_dir():
-            raise UsageError(f"there is no folder {path.absolute().parent}")
-        if path.exists() and not path.is_file():
-            raise UsageError(f"{path} is a folder, or no file to write to")
-        if path.exists() and not args.overwrite:
-            raise UsageError(f"{path} exists: choose another name, or pass --overwrite")
-    for path in places.values():
-        writing.check_folder(path)
-
-
-def _check_formats(args, preview):
-    if args.input != "suzanne" and args.input.suffix.lower() not in suffixes.READ:
-        raise UsageError(f"cannot read {args.input}: use {', '.join(suffixes.READ)}")
-    if args.output and args.output.suffix.lower() not in suffixes.WRITTEN:
-        raise UsageError(f"cannot write {args.output}: UVs can be kept in {', '.join(suffixes.WRITTEN)}")
-    if args.preview and args.preview.suffix.lower() not in preview.FORMATS:
-        raise UsageError(f"cannot write {args.preview}: pictures can be {', '.join(preview.FORMATS)}")
-    if args.texcoord is not None and not (isinstance(args.texcoord, int) and args.texcoord >= 0):
-        raise UsageError(f"--texcoord is {args.texcoord!r}: choose a whole number from 0")
-
-
-def _check_room(args, objects, files):
-    sizes = {args.preview: 100_000} if args.preview else {}
-    if args.output:
-        sizes[args.output] = files.likely_size(args.output, args.input, objects)
-    writing.check_room(sizes)

@@ -33,6 +33,8 @@ class Record:
         self.warnings = []  # what Blender says of the files
         self.losses = []  # what the format of the output does not hold: `losses.Loss`
         self.cuts = []  # the new seams of each mesh, as a dictionary
+        self.check = None  # what a check found in all islands together, as a dictionary
+        self.published = None  # the published measures of all islands together
         self.write = None  # "patch" or "export"
         self.not_patched = None  # why it is an export where a patch was to be
         self.files = []
@@ -44,11 +46,11 @@ class Record:
         self._part = None
 
     def begin(self, part):
-        """From now on, time is spent on this part: "read", "unwrap" or "write"; None for none of them."""
+        """From now on, time is spent on this part: "read", "unwrap", "check" or "write"; None for none of them."""
         now = perf_counter()
         if self._part:
             name, since = self._part
-            self._times[name] += now - since
+            self._times[name] = self._times.get(name, 0.0) + now - since
         self._part = (part, now) if part else None
 
     def fail(self, code, error):
@@ -61,12 +63,14 @@ class Record:
 
     @property
     def failed(self):
-        """How many islands count as failed."""
+        """How many islands count as failed, in a check those with faults."""
+        if self.check is not None:
+            return sum(not each.is_clean for each in self.outcomes)
         return sum(bool(each.error or (self.strict and not each.injective)) for each in self.outcomes)
 
     def judge(self):
         """Set the exit code by what became of the islands."""
-        if not self.done:
+        if self.check is None and not self.done:
             self.fail(FAILED, "nothing could be unwrapped")
         else:
             self.exit_code = PARTIAL if self.failed else OK
@@ -92,7 +96,7 @@ class Record:
         done = self.done
         return dict(
             format=FORMAT,
-            status=_STATUS.get(self.exit_code, "stopped"),
+            status="faults" if self.check and self.exit_code == PARTIAL else _STATUS.get(self.exit_code, "stopped"),
             exit_code=self.exit_code,
             error=self.error,
             input=self.input,
@@ -123,6 +127,8 @@ class Record:
             not_written=[loss._asdict() for loss in self.losses],
             warnings=self.warnings,
             cuts=self.cuts,
+            check=self.check,
+            published=self.published and self.published.to_dict(),
             islands=self._islands(),
         )
 

@@ -28,6 +28,12 @@ def hint_at_seams(works):
 
 
 def _is_stretched_tube(work):
-    if work.uv is None or work.in_frame or work.settings.boundary != 'FREE' or len(work.loops) != 2:
+    if (
+        work.uv is None
+        or work.in_frame
+        or work.importance is not None
+        or work.settings.boundary != 'FREE'
+        or len(work.loops) != 2
+    ):
         return False
     return work.outcome.after.symmetric_dirichlet > _STRETCHED and len(work.triangles) <= _LARGEST

@@ -2,7 +2,8 @@
 """All that is done to faces in one go, for the operators and the command line: cut, unwrap, or both; relax."""
 
 from ..core.stepping import mapped
-from . import cutting, mesh_arrays, modes, relaxing, uv_selection
+from . import cutting, mesh_arrays, modes, relaxing
+from .last_run import last_run
 from .unwrapping import unwrap_targets
 
 _CUTTING = {'NEVER': 0.0, 'NEEDED': 0.1, 'DISTORTION': 0.7}  # the part of the work, by and large
@@ -20,6 +21,7 @@ def cut_and_unwrap(targets, settings, options, context, seam_settings=None, seam
         cuts = yield from mapped(lambda share: part * share, steps)
     steps = unwrap_targets(targets, settings, options, context, cuts)
     outcomes = yield from mapped(lambda share: part + (1 - part) * share, steps)
+    last_run.remember(outcomes, settings, options)
     return outcomes, cuts
 
 
@@ -33,8 +35,18 @@ def cut(targets, settings, options, context, seam_settings, seam_options):
     return [], cuts
 
 
-def relax(targets, settings, options, context):
-    """Relax the targets' faces where they lie, in Object Mode: the outcomes of their regions, and no cuts."""
-    chosen = [(target.obj, uv_selection.of_faces(target.obj, target.faces)) for target in targets]
-    outcomes = yield from relaxing.relax(chosen, settings, options, context)
+def relax(chosen, settings, options, context):
+    """Relax what is chosen, as `relaxing.relax` wants it: the outcomes of its regions, and no cuts."""
+    return (yield from _remembered(relaxing.relax(chosen, settings, options, context), settings, options))
+
+
+def straighten(chosen, settings, options, context):
+    """The same with what is to become straight."""
+    return (yield from _remembered(relaxing.straighten(chosen, settings, options, context), settings, options))
+
+
+def _remembered(steps, settings, options):
+    outcomes = yield from steps
+    if outcomes:
+        last_run.remember(outcomes, settings, options)
     return outcomes, []

@@ -21,13 +21,25 @@ class LastRun:
         self.outcomes = latest
         self.ordered, self.errors, self.lines, self.summary, self.settings = [], [], [], "", {}
         self.options, self.unwrap_settings = MeshOptions(), Settings()
+        self.check, self._to_look_at = None, {}  # the `inspecting.Check` if it was one
 
     def remember(self, outcomes, settings, options):
         """Keep the outcomes of a run with these settings, of an unwrap or of anything else, and these mesh options."""
         self.outcomes[:] = outcomes
         self.settings = dataclasses.asdict(settings) | dataclasses.asdict(options)
-        self.options = options
+        self.options, self.check = options, None
         self.unwrap_settings = settings if isinstance(settings, Settings) else Settings()
+        self.work_out()
+
+    def remember_check(self, outcomes, check):
+        """Remember a check of UVs in place of an unwrap."""
+        self.outcomes[:] = outcomes
+        self.settings, self.check = {}, check
+        faces = {}
+        for outcome in outcomes:
+            if not outcome.is_clean:
+                faces.setdefault(outcome.obj, []).append(outcome.face_indices)
+        self._to_look_at = {name: np.sort(np.concatenate(its)) for name, its in faces.items()}
         self.work_out()
 
     def work_out(self):
@@ -47,7 +59,7 @@ class LastRun:
     @property
     def overlapping(self):
         """The outcomes of islands that lie on others since they were unwrapped."""
-        return [outcome for outcome in self.outcomes if outcome.overlaps and not outcome.error]
+        return [each for each in self.outcomes if each.overlaps and not each.error and not each.is_check]
 
     @property
     def closed(self):
@@ -57,6 +69,13 @@ class LastRun:
     def find(self, obj, number):
         """The outcome of an island, given by its object's name and its number, None if there is none."""
         return next((each for each in self.outcomes if (each.obj, each.number) == (obj, number)), None)
+
+    def found(self, kind):
+        """The faces (k,) that the last check found, by the names of their objects.
+
+        kind  "FLIPPED", "MIRRORED", "OVERLAPPING", "WORST", or "LOOK" for all of the islands that have a fault
+        """
+        return self._to_look_at if kind == 'LOOK' else self.check.faces[kind.lower()]
 
     def text(self, blender):
         """All of it for a report of a fault, with the versions of what took part and the settings."""

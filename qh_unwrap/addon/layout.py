@@ -6,7 +6,10 @@ import itertools
 import numpy as np
 
 from ..core import UnwrapError, placing
-from . import packing
+from ..core.triangles import areas_in_space
+from . import packing, texels
+
+_SLACK = 1e-5  # of the square, by which islands may reach over its border
 
 
 def place(works, all_works, options, context):
@@ -20,6 +23,9 @@ def place(works, all_works, options, context):
             work.uv = placing.in_unit_square(work.uv / work.aspect) * work.aspect
         elif old is not None:
             work.uv = placing.in_place(work.uv, work.triangles, old)
+    texels.choose_scales(works, options, context)
+    if options.placement != 'PACK':
+        _resize([work for work in works if options.placement == 'UNIT' or work.old_triangles is not None])
     if options.placement == 'UNIT':
         return
     new = [work for work in works if work.old_triangles is None]
@@ -33,6 +39,14 @@ def place(works, all_works, options, context):
     elif new:
         _pack(new, options, False, context)
         _move_beside(new, all_works)
+
+
+def _resize(works):
+    """Give islands the scale that is chosen for them, around their middles."""
+    works = [work for work in works if work.scale is not None]
+    for work, factor in zip(works, texels.factors(works), strict=True):
+        middle = placing.centre(work.uv[work.triangles])
+        work.uv = middle + (work.uv - middle) * factor
 
 
 def pack_apart(works, options, context):
@@ -73,7 +87,16 @@ def _pack(works, options, nested, context):
     if not works:
         return
     works = sorted(works, key=lambda work: work.aspect[0])
-    uvs, enlarged = placing.to_scale([(work.uv, work.vertices, work.triangles) for work in works])
+    islands = [(work.uv, work.vertices, work.triangles) for work in works]
+    uvs, enlarged = placing.to_scale(islands, _importance(works))
+    scaled = works[0].scale is not None  # as then all of them are
+    if scaled:
+        for work, uv in zip(works, uvs, strict=True):
+            work.uv = uv
+        factors = texels.factors(works)
+        factors /= np.sqrt(((factors * [np.ptp(uv, axis=0).max() for uv in uvs]) ** 2).sum())
+        uvs = [uv * factor for uv, factor in zip(uvs, factors, strict=True)]
+        enlarged = np.zeros(len(works), dtype=bool)
     islands = zip(works, uvs, strict=True)
     groups = {
         aspect: [(uv, work.triangles) for work, uv in group]
@@ -89,6 +112,34 @@ def _pack(works, options, nested, context):
         work.uv = uv
         if is_enlarged and uv is not None:
             work.outcome.warnings += ("beside the others it would vanish: packed larger than its share",)
+    if scaled:
+        _resize_together([work for work in works if work.uv is not None])
+
+
+def _importance(works):
+    """How important the works are in the mean over their surface, (k,), None if all are alike."""
+    if all(work.importance is None for work in works):
+        return None
+    return np.array(
+        [
+            1.0
+            if work.importance is None
+            else np.average(work.importance, weights=areas_in_space(work.vertices, work.triangles))
+            for work in works
+        ]
+    )
+
+
+def _resize_together(works):
+    """Give packed islands the scales that are chosen for them, all by the same factor around the origin."""
+    if not works:
+        return
+    factor = float(np.median(texels.factors(works)))
+    for work in works:
+        work.uv = work.uv * factor
+    if max((work.uv / work.aspect).max() for work in works) > 1 + _SLACK:
+        for work in works:
+            work.outcome.warnings += ("at this texel density the islands need more room than the 0 to 1 square",)
 
 
 def _others(works, all_works):

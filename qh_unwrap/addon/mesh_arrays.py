@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import bmesh
 import bpy
@@ -13,8 +14,17 @@ from ..core.cuttable import Polygons
 from ..core.edge_costs import Wishes
 from ..core.pieces import around_faces
 from ..core.welding import find_welds
+from . import bulk
+from .bulk import corner_edges, corner_triangles, corner_vertices
 from .options import MeshOptions
 from .shown_shape import shown_vertices
+
+
+class Picture(NamedTuple):
+    """What counts of an image."""
+
+    pixels: int  # width times height
+    tiles: frozenset[int]  # the numbers of its tiles, 1001 for one that has none
 
 
 @dataclass(frozen=True)
@@ -31,7 +41,9 @@ class MeshArrays:
     aspect: np.ndarray  # (f,) width by height of the image on each face
     slot: np.ndarray  # (f,) the number of each face's material among the images
     images: tuple[str, ...]  # what each of the materials shows, the same for what shares its UVs
+    pictures: tuple["Picture | None", ...]  # the image itself of each material, None for those without one
     welded_edge: np.ndarray | None = None  # (e,) the edge that each counts as, None if nothing shall be welded
+    importance: np.ndarray | None = None  # (n,) its logarithm at the vertices, None if all are alike
     wishes: Wishes | None = None  # where seams are welcome, if somebody asks
 
     @cached_property
@@ -72,10 +84,14 @@ class MeshArrays:
 
     def image_of(self, faces):
         """The image that most of the faces show."""
-        if len(set(self.images)) == 1:
-            return self.images[0]
+        return self.images[0] if len(set(self.images)) == 1 else self.images[self.slot_of(faces)]
+
+    def slot_of(self, faces):
+        """The number of the material that most of the faces have."""
+        if len(self.images) == 1:
+            return 0
         slots, counts = np.unique(self.slot[faces], return_counts=True)
-        return self.images[slots[np.argmax(counts)]]
+        return slots[np.argmax(counts)]
 
     def faces_by_image(self):
         """Yield each image, and which faces show it, (f,) bool."""
@@ -119,12 +135,12 @@ def _read(obj, mesh, uv_name, options, vertex_group):
         uv = uvs(mesh, uv_name).astype(np.float64)
         pins = mesh.attributes.get(f".pn.{uv_name}")  # in Blender 4, asking the layer for its pins would make this
         if pins is not None:
-            pinned = _get(pins.data, "value", bool)
-    slot, images, aspects = _images(obj, mesh)
-    corner_vertex = _of_corners(mesh, ".corner_vert", "vertex_index")
-    corner_edge = _of_corners(mesh, ".corner_edge", "edge_index")
-    face_start = _get(mesh.polygons, "loop_start", np.int32)
-    seam, welded_edge = _get(mesh.edges, "use_seam", bool), None
+            pinned = bulk.values(pins.data, "value", bool)
+    slot, images, aspects, pictures = _images(obj, mesh)
+    corner_vertex = corner_vertices(mesh)
+    corner_edge = corner_edges(mesh)
+    face_start = bulk.values(mesh.polygons, "loop_start", np.int32)
+    seam, welded_edge = bulk.values(mesh.edges, "use_seam", bool), None
     if options.weld:
         unsmoothed = shown_vertices(obj, mesh, False) if options.use_subsurf_data else vertices
         welds = find_welds(_shapes(obj, unsmoothed), corner_vertex, corner_edge, face_start, len(seam))
@@ -137,25 +153,33 @@ def _read(obj, mesh, uv_name, options, vertex_group):
         corner_edge=corner_edge,
         face_start=face_start,
         seam=seam,
-        corner_triangles=_corner_triangles(mesh),
+        corner_triangles=corner_triangles(mesh),
         uv=uv,
         pinned=pinned,
         aspect=aspects[slot] if options.correct_aspect else np.ones(len(mesh.polygons)),
         slot=slot,
         images=images,
+        pictures=pictures,
         welded_edge=welded_edge,
+        importance=_importance(obj, mesh, options),
         wishes=None if vertex_group is None else _wishes(obj, mesh, vertex_group, corner_edge, face_start),
     )
 
 
 def _wishes(obj, mesh, vertex_group, corner_edge, face_start):
     """Sharp edges and borders of materials are marked, and the vertices of the group are spared by their weights."""
-    marked = _get(mesh.edges, "use_edge_sharp", bool)
-    material = _get(mesh.polygons, "material_index", np.int32)[around_faces(face_start, len(corner_edge))[0]]
+    marked = bulk.values(mesh.edges, "use_edge_sharp", bool)
+    material = bulk.values(mesh.polygons, "material_index", np.int32)[around_faces(face_start, len(corner_edge))[0]]
     lowest, highest = np.full(len(marked), np.iinfo(np.int32).max), np.full(len(marked), -1)
     np.minimum.at(lowest, corner_edge, material)
     np.maximum.at(highest, corner_edge, material)
     return Wishes(marked=marked | (lowest < highest), spared=_weights(obj, mesh, vertex_group))
+
+
+def _importance(obj, mesh, options):
+    """The logarithms of the importance of the vertices, None if nobody asks or there is no such group."""
+    weights = _weights(obj, mesh, options.weight_group) if options.use_weights else None
+    return None if weights is None else weights * np.log(options.weight_factor)
 
 
 def _weights(obj, mesh, name):
@@ -173,7 +197,7 @@ def _weights(obj, mesh, name):
 
 def uvs(mesh, name):
     """(c, 2) float32 the UVs of the map with this name."""
-    return _get(mesh.uv_layers[name].uv, "vector", np.float32, 2)
+    return bulk.values(mesh.uv_layers[name].uv, "vector", np.float32, 2)
 
 
 def _shapes(obj, shown):
@@ -184,37 +208,27 @@ def _shapes(obj, shown):
     """
     keys = obj.data.shape_keys
     for key in keys.key_blocks if keys else ():
-        yield _get(key.data, "co", np.float32, 3)
+        yield bulk.values(key.data, "co", np.float32, 3)
     yield shown
 
 
-def _get(collection, name, dtype, width=1):
-    values = np.empty(len(collection) * width, dtype=dtype)
-    collection.foreach_get(name, values)
-    return values.reshape(-1, width) if width > 1 else values
-
-
-def _of_corners(mesh, attribute, name):
-    """The corners' vertices or edges: read as an attribute they are copied in one go, by their name one by one."""
-    values = mesh.attributes.get(attribute)
-    return _get(mesh.loops, name, np.int32) if values is None else _get(values.data, "value", np.int32)
-
-
-def _corner_triangles(mesh):
-    if len(mesh.loops) == 3 * len(mesh.polygons):
-        return np.arange(len(mesh.loops), dtype=np.int32).reshape(-1, 3)
-    mesh.calc_loop_triangles()
-    return _get(mesh.loop_triangles, "loops", np.int32, 3)
+def materials_on(obj, mesh):
+    """The object's materials, [None] for none, and the number of each face's among them, (f,)."""
+    materials = [slot.material for slot in obj.material_slots] or [None]
+    if len(materials) == 1:
+        return materials, np.zeros(len(mesh.polygons), dtype=np.int32)
+    return materials, np.minimum(bulk.values(mesh.polygons, "material_index", np.int32), len(materials) - 1)
 
 
 def _images(obj, mesh):
-    """The number of each face's material, (f,), what these materials show, and the aspects of that, (m,).
+    """The number of each face's material, (f,), what these materials show, the aspects of that, (m,), and their
+    images.
 
     What has the same image shares its UVs; without an image, what has the same material, which may get one later; and
     without a material, what is one object.
     """
-    materials = [slot.material for slot in obj.material_slots] or [None]
-    images = [_image(material) for material in materials]
+    materials, slot = materials_on(obj, mesh)
+    images = [image_of(material) for material in materials]
     names = tuple(
         f"image {image.name_full}"
         if image
@@ -223,21 +237,25 @@ def _images(obj, mesh):
         else f"object {obj.name_full}"
         for image, material in zip(images, materials, strict=True)
     )
-    if len(materials) == 1:
-        slot = np.zeros(len(mesh.polygons), dtype=np.int32)
-    else:
-        slot = np.minimum(_get(mesh.polygons, "material_index", np.int32), len(materials) - 1)
-    return slot, names, np.array([_aspect(image) for image in images])
+    aspects = np.array([aspect_of(image) for image in images])
+    return slot, names, aspects, tuple(_picture(image) for image in images)
 
 
-def _image(material):
+def image_of(material):
     """The image that Blender shows for the material in the viewport, None if there is none."""
     nodes = material.node_tree.nodes if material and material.use_nodes and material.node_tree else ()
     nodes = [node for node in nodes if node.type == 'TEX_IMAGE' and node.image and min(node.image.size) > 0]
     return next((node for node in nodes if node.show_texture), nodes[0]).image if nodes else None
 
 
-def _aspect(image):
+def _picture(image):
+    if image is None:
+        return None
+    tiles = [tile.number for tile in image.tiles] if image.source == 'TILED' else [1001]
+    return Picture(image.size[0] * image.size[1], frozenset(tiles))
+
+
+def aspect_of(image):
     """Width by height of the image as it is shown, 1 for none."""
     if image is None:
         return 1.0
@@ -251,7 +269,7 @@ def write(obj, corners, uv):
     layer = _active_or_new_map(mesh)
     if layer is None:
         raise UnwrapError("Blender could not add a UV map: remove one of the mesh's UV maps or attributes")
-    values = _get(layer.uv, "vector", np.float32, 2)
+    values = bulk.values(layer.uv, "vector", np.float32, 2)
     values[corners] = uv
     if bpy.app.version >= (5, 0, 0):  # where `mesh.attributes` would spoil the selection of UVs
         layer.uv.foreach_set("vector", values.ravel())
@@ -262,12 +280,12 @@ def write(obj, corners, uv):
 
 def edge_vertices(obj):
     """(e, 2) the vertices of the object's edges; not in Edit Mode."""
-    return _get(obj.data.edges, "vertices", np.int32, 2)
+    return bulk.values(obj.data.edges, "vertices", np.int32, 2)
 
 
 def mark_seams(obj, edges):
     """Mark the edges (e,) bool as seams; call it within `modes.in_object_mode`."""
-    seam = _get(obj.data.edges, "use_seam", bool)
+    seam = bulk.values(obj.data.edges, "use_seam", bool)
     obj.data.edges.foreach_set("use_seam", seam | edges)
     obj.data.update()
 

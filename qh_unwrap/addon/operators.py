@@ -6,14 +6,14 @@ import dataclasses
 import bpy
 
 from ..core.errors import SettingsError
-from . import jobs, properties, relaxing, selection, telling, uv_selection
+from . import jobs, properties, selection, telling, uv_selection
 from .outcome import latest
 from .running import InSteps
 
 last_outcomes = latest
 
 
-class _OnSelectedFaces(InSteps):
+class OnSelectedFaces(InSteps):
     """Mix-in for an operator on the faces that are selected."""
 
     @classmethod
@@ -26,15 +26,15 @@ class _OnSelectedFaces(InSteps):
         return False
 
 
-class QH_OT_unwrap(_OnSelectedFaces, properties.OperatorProperties, bpy.types.Operator):
+class QH_OT_unwrap(OnSelectedFaces, properties.OperatorProperties, bpy.types.Operator):
     """Unwrap the selected faces, in Object Mode all faces, with little distortion and without flipping any"""
 
     bl_idname = "uv.qh_unwrap"
     bl_label = "Quasi-Harmonic Unwrap"
     bl_options = {'REGISTER', 'UNDO'}
 
-    def draw(self, _context):
-        properties.draw(self.layout, self)
+    def draw(self, context):
+        properties.draw(self.layout, self, context.object)
 
     def invoke(self, context, event):
         """From a menu: with the panel's settings.  Scripts come to `execute`, with the defaults."""
@@ -52,6 +52,10 @@ class QH_OT_unwrap(_OnSelectedFaces, properties.OperatorProperties, bpy.types.Op
         except SettingsError as error:
             self.report({'ERROR'}, str(error))
             return None
+        problem = options.use_weights and selection.without_group(targets, options.weight_group)
+        if problem:
+            self.report({'ERROR'}, problem)
+            return None
         seams = context.scene.qh_seams
         return jobs.cut_and_unwrap(targets, settings, options, context, seams.seam_settings(), seams.seam_options())
 
@@ -59,7 +63,7 @@ class QH_OT_unwrap(_OnSelectedFaces, properties.OperatorProperties, bpy.types.Op
         return telling.tell(self, *result)
 
 
-class QH_OT_seams(_OnSelectedFaces, properties.SeamOperatorProperties, bpy.types.Operator):
+class QH_OT_seams(OnSelectedFaces, properties.SeamOperatorProperties, bpy.types.Operator):
     """Mark seams on the selected faces, in Object Mode on all faces, so that they unwrap with little distortion"""
 
     bl_idname = "uv.qh_seams"
@@ -94,7 +98,7 @@ class QH_OT_seams(_OnSelectedFaces, properties.SeamOperatorProperties, bpy.types
         return telling.tell(self, outcomes, cuts) if outcomes else telling.tell_of_seams(self, cuts)
 
 
-class _OnSelectedUVs(_OnSelectedFaces):
+class _OnSelectedUVs(OnSelectedFaces):
     """Mix-in for an operator that changes the UVs that are selected; the classes say how, and what to select."""
 
     nothing = ""
@@ -107,11 +111,12 @@ class _OnSelectedUVs(_OnSelectedFaces):
         chosen = [(obj, uv_selection.read(obj, context)) for obj in selection.mesh_objects(context)]
         return self.work(chosen, self.settings(), options, context)
 
-    def finish(self, outcomes):
+    def finish(self, result):
+        outcomes, _ = result
         if not outcomes:
             self.report({'ERROR'}, self.nothing)
             return {'CANCELLED'}
-        return telling.tell(self, outcomes, [])
+        return telling.tell(self, *result)
 
 
 class QH_OT_relax(_OnSelectedUVs, properties.RelaxOperatorProperties, bpy.types.Operator):
@@ -122,7 +127,7 @@ class QH_OT_relax(_OnSelectedUVs, properties.RelaxOperatorProperties, bpy.types.
     bl_options = {'REGISTER', 'UNDO'}
 
     nothing = "No UVs are selected: select some to relax, in the UV Editor or in the 3D View"
-    work = staticmethod(relaxing.relax)
+    work = staticmethod(jobs.relax)
 
     def invoke(self, context, event):
         """From a menu: with the panel's settings.  Scripts come to `execute`, with the defaults."""
@@ -138,7 +143,7 @@ class QH_OT_straighten(_OnSelectedUVs, properties.StraightenOperatorProperties, 
     bl_options = {'REGISTER', 'UNDO'}
 
     nothing = "Nothing is selected that could become straight: select edges, or quads for a rectangle"
-    work = staticmethod(relaxing.straighten)
+    work = staticmethod(jobs.straighten)
 
     def invoke(self, context, event):
         """From a menu: with the panel's settings.  Scripts come to `execute`, with the defaults."""

@@ -28,6 +28,12 @@ _MARGIN_METHOD = (
     Choice("FRACTION", "Fraction", "The margin is this part of the square, exactly; slow"),
 )
 
+_TEXEL_DENSITY = (
+    Choice("PLACED", "As Placed", "What the placement makes of it"),
+    Choice("KEEP", "Keep", "Each island keeps the density that it has; new ones get the mean of the others"),
+    Choice("GIVEN", "Given", "All islands get the pixels per metre that are given, though they may not fit the square"),
+)
+
 
 _NEEDED = Choice(
     "NEEDED",
@@ -58,6 +64,18 @@ class MeshOptions:
         0.005, "Margin", "Space around the islands that are packed", range=(0.0, 1.0), soft_range=(0.0, 0.1)
     )
     rotate: bool = setting(False, "Rotate", "Packing may turn islands by right angles; otherwise they stay as upright")
+    texel_density: str = setting(
+        "PLACED",
+        "Texel Density",
+        "How large islands are in the image; what pins or a kept boundary hold stays",
+        choices=_TEXEL_DENSITY,
+    )
+    pixels_per_metre: float = setting(
+        512.0, "Pixels per Metre", "The texel density to get", range=(1e-3, 1e7), soft_range=(1.0, 4096.0)
+    )
+    image_size: int = setting(
+        1024, "Image Size", "Pixels along a side of the image where the material has none", range=(1, 1_000_000)
+    )
     correct_aspect: bool = setting(
         True, "Correct Aspect", "Make up for an image that is not square, the one in the faces' material"
     )
@@ -71,6 +89,17 @@ class MeshOptions:
         "Use Subsurf",
         "Unwrap the mesh as its Subdivision Surface modifier smooths it; the modifier may stand anywhere, others do"
         " not count",
+    )
+    use_weights: bool = setting(
+        False, "Importance Weights", "Give the regions of a vertex group more room in the map, and so more texels"
+    )
+    weight_group: str = setting("uv_importance", "Weight Group", "The vertex group with the importance weights")
+    weight_factor: float = setting(
+        4.0,
+        "Weight Factor",
+        "How many times as large faces of weight 1 become as those of weight 0; 1 changes nothing",
+        range=(1e-3, 1e4),
+        soft_range=(0.1, 10.0),
     )
     weld: bool = setting(
         False,
@@ -96,6 +125,40 @@ class SeamOptions:
         "", "Spare", "The vertex group that seams keep away from; edges between vertices of weight 1 are not cut"
     )
     unwrap: bool = setting(True, "Unwrap", "Unwrap the faces as well, with the settings of Quasi-Harmonic Unwrap")
+
+    def __post_init__(self):
+        _check(self)
+
+
+_QUANTITY = (
+    Choice(
+        "STRETCH",
+        "Stretch",
+        "How far the image is drawn out on the model, compared with the whole island; 1 is not at all",
+    ),
+    Choice("ANGLE", "Angle", "How much longer than wide a square of the image becomes on the model; 1 is not at all"),
+    Choice("AREA", "Area", "How much of the image a face gets, compared with the whole island"),
+    Choice(
+        "DENSITY",
+        "Texel Density",
+        "Pixels of the material's image along a metre, compared with all that is shown; as if there were one of 1024"
+        " pixels where there is none",
+    ),
+)
+
+
+@dataclass(frozen=True)
+class HeatSettings:
+    """What a heatmap shows.  Values are checked as well."""
+
+    quantity: str = setting("STRETCH", "Show", "What the colors mean", choices=_QUANTITY)
+    limit: float = setting(
+        2.0,
+        "Full Color",
+        "The ratio at which the color is strongest",
+        range=(1.001, 1000.0),
+        soft_range=(1.05, 10.0),
+    )
 
     def __post_init__(self):
         _check(self)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core import Distortion
 from ..core.overlaps import ENOUGH
+from ..core.published import PublishedMeasures
 
 _NAMES = 5  # that are told; further ones are counted
 
@@ -33,6 +34,13 @@ class Outcome:
     error: str = ""
     needs_cut: bool = False  # failed because it is closed or has a handle
     cut_edges: int = 0  # that were marked as seams in it
+    texel_density: float | None = None  # pixels of its image along a metre of its surface
+    published: tuple[PublishedMeasures, int] | None = None  # and its place among these
+    is_check: bool = False  # of UVs as they were found, with all that follows
+    faults: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what is no fault
+    mirrored: bool = False  # as a whole
+    stacked: int = 0  # others whose faces coincide with its own
 
     @property
     def faces(self):
@@ -61,12 +69,14 @@ class Outcome:
             return ""
         more = len(self.overlaps) - 1 + self.more_overlaps
         least = "at least " if more + 1 >= ENOUGH else ""  # no more were looked for
-        return f"it lies on {self.overlaps[0]}{f' and {least}{more} more' if more else ''} now: {self.overlap_cure}"
+        now = "" if self.is_check else " now"
+        return f"it lies on {self.overlaps[0]}{f' and {least}{more} more' if more else ''}{now}: {self.overlap_cure}"
 
     @property
     def remarks(self):
-        """Its warnings, and whether it overlaps itself."""
-        return [*self.warnings, *(["it overlaps itself"] if self.overlaps_itself else [])]
+        """Its faults, warnings and notes, and whether it overlaps itself."""
+        itself = self.overlaps_itself and not self.is_check  # which tells it as a fault
+        return [*self.faults, *self.warnings, *self.notes, *(["it overlaps itself"] if itself else [])]
 
     def messages(self):
         """All that there is to say about it, as sentences that begin with "it" or stand for themselves."""
@@ -79,7 +89,7 @@ class Outcome:
     @property
     def is_clean(self):
         """Unwrapped, with nothing flipped, collapsed or on top of anything."""
-        return not self.error and self.injective and not self.overlaps
+        return not self.error and self.injective and not self.overlaps and not self.faults
 
     @property
     def rank(self):
@@ -93,17 +103,33 @@ class Outcome:
         values = dict(object=self.obj, island=self.number, faces=self.faces)
         if self.error:
             return values | dict(error=self.error)
+        if self.is_check:
+            its = dict(faults=list(self.faults), mirrored=self.mirrored, stacked=self.stacked)
+            values |= dict(after=self.after.to_dict()) | its
+        else:
+            values |= dict(
+                before=self.before and self.before.to_dict(),
+                after=self.after.to_dict(),
+                iterations=self.iterations,
+                cut_edges=self.cut_edges,
+                converged=self.converged,
+            )
         return values | dict(
-            before=self.before and self.before.to_dict(),
-            after=self.after.to_dict(),
-            iterations=self.iterations,
-            cut_edges=self.cut_edges,
-            converged=self.converged,
             injective=self.injective,
             overlaps=list(self.overlaps),
             more_overlaps=self.more_overlaps,
             warnings=self.messages(),
+            texel_density=self.texel_density,
+            published=self.published_measures(),
         )
+
+    def published_measures(self):
+        """Its measures by a published benchmark, None where it has no area or nobody asked for them."""
+        if not self.published:
+            return None
+        measures, k = self.published
+        its = measures.of(k)
+        return its and its.to_dict()
 
 
 latest: list[Outcome] = []  # of the latest run
@@ -141,7 +167,8 @@ def findings(outcomes):
         yield first.sentence(first.overlap), first
     else:
         where = f"first: {first.name} on {first.overlaps[0]}"
-        yield f"{len(lying)} islands lie on others now ({where}): {first.overlap_cure}", first
+        now = "" if first.is_check else " now"
+        yield f"{len(lying)} islands lie on others{now} ({where}): {first.overlap_cure}", first
 
 
 def error_findings(outcomes):
@@ -152,9 +179,10 @@ def error_findings(outcomes):
 def _lines(remarks):
     """A line for each kind among pairs of outcomes and texts, which names the first of those that it is said of, and
     that one."""
-    kinds = {}
+    kinds, kind_of = {}, {}
     for outcome, text in remarks:
-        kinds.setdefault(_kind(text), []).append((outcome, text))
+        kind = kind_of.get(text) or kind_of.setdefault(text, _kind(text))
+        kinds.setdefault(kind, []).append((outcome, text))
     for (first, text), *others in kinds.values():
         yield f"{len(others) + 1} islands (first: {first.name}): {text}" if others else first.sentence(text), first
 
@@ -189,6 +217,19 @@ def summary(outcomes):
     return "; ".join(parts)
 
 
+def check_summary(outcomes):
+    """The same of a check: "3 islands, stretch 1.090, no flips; 1 island needs a look"."""
+    done = [outcome for outcome in outcomes if not outcome.error]
+    parts = [summary(done)] if done else []
+    unclean = sum(not outcome.is_clean for outcome in done)
+    if unclean:
+        parts.append(f"{count(unclean, 'island')} {'needs' if unclean == 1 else 'need'} a look")
+    without = sum(outcome.faces for outcome in outcomes if outcome.error)
+    if without:
+        parts.append(f"{count(without, 'face')} could not be checked")
+    return "; ".join(parts)
+
+
 def faults(flips, collapsed):
     """How many triangles are flipped or collapsed: "no flips", "2 flips, 908 collapsed" or "908 collapsed"."""
     parts = [count(flips, "flip")] if flips or not collapsed else []
@@ -214,6 +255,15 @@ def mean_after(outcomes, name):
     return float(_mean(outcomes, [getattr(outcome.after, name) for outcome in outcomes]))
 
 
+def shown_density(outcomes):
+    """The texel density of several, from the least to the largest: "512.0", "256.0 – 512.0", "-" for none."""
+    known = [f"{outcome.texel_density:.1f}" for outcome in outcomes if outcome.texel_density]
+    if not known:
+        return "-"
+    least, most = min(known, key=float), max(known, key=float)
+    return least if least == most else f"{least} – {most}"
+
+
 def told_of(reason, names):
     """What there is to say of objects: "2 objects without faces: Cube, Plane"."""
     return f"{count(len(names), 'object')} {reason}: {listed(names)}"
@@ -234,5 +284,6 @@ def _shown(value):
 
 
 def _mean(outcomes, values):
-    """Mean over the surface."""
-    return np.average(values, weights=[outcome.area for outcome in outcomes])
+    """Mean over the surface; of all alike where there is no area."""
+    areas = np.array([outcome.area for outcome in outcomes])
+    return np.average(values, weights=areas if areas.any() else None)

@@ -66,7 +66,7 @@ def _done(scene, meshes, options, nested, context):
         area=None,  # an image editor would have the islands packed into the tile where they lie
         region=None,
     ):
-        bpy.ops.ptcache.bake_all(bake=False)  # forgets an ESC pressed before, at which the packer silently stops
+        forget_escape()
         bpy.ops.object.mode_set(mode='EDIT')
         bpy.ops.mesh.select_all(action='SELECT')
         done = bpy.ops.uv.pack_islands(
@@ -82,6 +82,11 @@ def _done(scene, meshes, options, nested, context):
         )
         bpy.ops.object.mode_set(mode='OBJECT')
     return done == {'FINISHED'}
+
+
+def forget_escape():
+    """Have Blender forget an ESC that was pressed before, at which its packer silently stops."""
+    bpy.ops.ptcache.bake_all(bake=False)
 
 
 def _mesh(aspect, islands, made):

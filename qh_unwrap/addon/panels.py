@@ -6,6 +6,8 @@ import textwrap
 import bpy
 
 from . import properties
+from .comparison import latest
+from .heatmap import heatmap
 from .last_run import last_run
 from .outcome import change, faults
 
@@ -27,6 +29,16 @@ def draw_seam_menu(menu, _context):
     menu.layout.operator("uv.qh_seams")
 
 
+def draw_distortion_menu(menu, _context):
+    menu.layout.operator("uv.qh_heatmap")
+    menu.layout.operator("uv.qh_compare")
+    menu.layout.operator("uv.qh_plot")
+
+
+def draw_check_menu(menu, _context):
+    menu.layout.operator("uv.qh_check")
+
+
 class _Panel:
     bl_label = "QH Unwrap"
     bl_category = "QH Unwrap"
@@ -38,7 +50,11 @@ class _Panel:
         button = layout.operator("uv.qh_unwrap", text="Unwrap", icon='UV')
         for name, value in settings.as_keywords().items():
             setattr(button, name, value)
-        properties.draw(layout.column(), settings)
+        row = layout.row(align=True)
+        row.operator("uv.qh_check", icon='VIEWZOOM')
+        if context.mode == 'EDIT_MESH':
+            row.operator("uv.qh_check", text="", icon='RESTRICT_SELECT_OFF').only_selected = True
+        properties.draw(layout.column(), settings, context.object)
 
 
 class _SeamPanel:
@@ -72,6 +88,40 @@ class _RelaxPanel:
             properties.draw_relaxing(column.column(), settings)
 
 
+class _DistortionPanel:
+    bl_label = "Distortion"
+    bl_region_type = 'UI'
+    bl_options = {'DEFAULT_CLOSED'}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator("uv.qh_heatmap", text="Heatmap", icon='SHADING_RENDERED', depress=heatmap.is_on)
+        column = layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        settings = context.scene.qh_heatmap
+        for field in settings.fields:
+            column.prop(settings, field.name)
+        layout.separator()
+        layout.operator("uv.qh_compare", icon='SPREADSHEET')
+        layout.operator("uv.qh_plot", icon='GRAPH')
+        if latest.comparison is not None:
+            _draw_comparison(layout, latest.comparison)
+
+
+def _draw_comparison(layout, comparison):
+    """The latest one in few words, which fit into the sidebar."""
+    column = layout.column(align=True)
+    column.label(text=comparison.title, icon='UV')
+    for row in comparison.rows:
+        name, stretch, *_, flips, overlaps, _ = row.cells
+        numbers = row.error or f"stretch {stretch}, {flips} flipped, {overlaps} overlap"
+        _draw_text(column, f"{name}: {numbers}", 'BLANK1')
+    row = layout.row(align=True)
+    row.operator("uv.qh_compare_show", text="Table", icon='SPREADSHEET')
+    row.operator("uv.qh_plot_save", icon='FILE_TICK')
+
+
 class _ReportPanel:
     bl_label = "Last Result"
     bl_region_type = 'UI'
@@ -87,6 +137,8 @@ class _ReportPanel:
                 row = self.layout.row()
                 _draw_text(row.column(align=True), line, icon)
                 _draw_select(row, outcome)
+        if last_run.check is not None:
+            _draw_check(self.layout, last_run.check)
         if last_run.overlapping:
             self.layout.operator("uv.qh_unwrap_pack_overlapping", icon='UV_ISLANDSEL')
         if last_run.closed:
@@ -107,6 +159,26 @@ def _draw_text(column, text, icon):
         icon = 'BLANK1'
 
 
+def _draw_check(layout, check):
+    """What is true of all islands together, and buttons that select what was found."""
+    if check.texel_density:
+        layout.label(text=f"{check.texel_density:.1f} pixels per metre", icon='TEXTURE')
+    column = layout.column(align=True)
+    for kind, text in _KINDS.items():
+        row = column.row(align=True)
+        row.enabled = bool(last_run.found(kind))
+        row.operator("uv.qh_check_select", text=text, icon='RESTRICT_SELECT_OFF').kind = kind
+
+
+_KINDS = {
+    'FLIPPED': "Flipped Faces",
+    'MIRRORED': "Mirrored Islands",
+    'OVERLAPPING': "Overlapping Faces",
+    'WORST': "Worst 1 %",
+    'LOOK': "Islands to Look At",
+}
+
+
 def _draw_select(row, outcome):
     """A button that selects the island's faces."""
     button = row.operator("uv.qh_unwrap_select", text="", icon='RESTRICT_SELECT_OFF')
@@ -125,6 +197,8 @@ def _draw_outcome(column, outcome):
         stretch = change(outcome.before, outcome.after, "l2_stretch")
         faulty = faults(outcome.after.flips, outcome.after.collapsed)
         column.label(text=f"Stretch {stretch}, {faulty}", icon='BLANK1')
+        if outcome.texel_density:
+            column.label(text=f"{outcome.texel_density:.1f} pixels per metre", icon='BLANK1')
 
 
 class QH_PT_uv_editor(_Panel, bpy.types.Panel):
@@ -155,6 +229,16 @@ class QH_PT_uv_editor_relax(_RelaxPanel, bpy.types.Panel):
 
 
 class QH_PT_view_3d_relax(_RelaxPanel, bpy.types.Panel):
+    bl_space_type = 'VIEW_3D'
+    bl_parent_id = "QH_PT_view_3d"
+
+
+class QH_PT_uv_editor_distortion(_DistortionPanel, bpy.types.Panel):
+    bl_space_type = 'IMAGE_EDITOR'
+    bl_parent_id = "QH_PT_uv_editor"
+
+
+class QH_PT_view_3d_distortion(_DistortionPanel, bpy.types.Panel):
     bl_space_type = 'VIEW_3D'
     bl_parent_id = "QH_PT_view_3d"
 

@@ -8,7 +8,7 @@ import bpy
 from ..core import Settings
 from ..core.relax_settings import RelaxSettings, StraightenSettings
 from ..core.seam_settings import SeamSettings
-from .options import MeshOptions, SeamOptions
+from .options import HeatSettings, MeshOptions, SeamOptions
 
 
 def _property(field, options=frozenset()):
@@ -122,16 +122,41 @@ class StraightenOperatorProperties(_Straightening, kinds=(StraightenSettings,), 
     """The same for an operator, which forgets them after each run."""
 
 
+class HeatProperties(_Properties, kinds=(HeatSettings,)):
+    """What the heatmap shows."""
+
+    def heat_settings(self):
+        return _made_from(self, HeatSettings)
+
+
 _FIRST = ('boundary', 'aspect', 'balance', 'iterations', 'weights')
 _SECTIONS = {
-    "Layout": ('placement', 'rotate', 'margin_method', 'margin'),
-    "Mesh": ('cut', 'fill_holes', 'correct_aspect', 'correct_scale', 'use_subsurf_data', 'weld'),
+    "Layout": (
+        'placement',
+        'rotate',
+        'margin_method',
+        'margin',
+        'texel_density',
+        'pixels_per_metre',
+        'image_size',
+    ),
+    "Mesh": (
+        'cut',
+        'fill_holes',
+        'correct_aspect',
+        'correct_scale',
+        'use_subsurf_data',
+        'weld',
+        'use_weights',
+        'weight_group',
+        'weight_factor',
+    ),
     "Advanced": ('initial', 'refine', 'repair', 'tolerance', 'tensor_power'),
 }
 
 
-def draw(layout, owner):
-    """A row for each property, the rarer ones in sections that fold; what does not apply is greyed out."""
+def draw(layout, owner, obj=None):
+    """A row for each property, the rarer ones in sections that fold; what does not apply is grey or not shown."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     _draw_rows(layout, owner, _FIRST)
@@ -139,16 +164,26 @@ def draw(layout, owner):
         header, body = layout.panel(f"qh_unwrap_{title.lower()}", default_closed=title != "Layout")
         header.label(text=title)
         if body:
-            _draw_rows(body, owner, names)
+            _draw_rows(body, owner, names, obj)
 
 
-def _draw_rows(layout, owner, names):
+def _draw_rows(layout, owner, names, obj=None):
+    shown = {
+        'aspect': owner.boundary == 'RECTANGLE',
+        'pixels_per_metre': owner.texel_density == 'GIVEN',
+        'image_size': owner.texel_density == 'GIVEN',
+        'weight_group': owner.use_weights,
+        'weight_factor': owner.use_weights,
+    }
     for name in names:
-        if name == 'aspect' and owner.boundary != 'RECTANGLE':
+        if not shown.get(name, True):
             continue
         row = layout.row()
         row.active = _applies(owner, name)
-        row.prop(owner, name)
+        if name == 'weight_group' and obj is not None and obj.type == 'MESH':
+            row.prop_search(owner, name, obj, "vertex_groups")
+        else:
+            row.prop(owner, name)
 
 
 def _applies(owner, name):
@@ -166,6 +201,9 @@ def _applies(owner, name):
         'rotate': placed and owner.placement == 'PACK',
         'margin': placed and owner.placement != 'UNIT',
         'margin_method': placed and owner.placement != 'UNIT',
+        'texel_density': placed,
+        'pixels_per_metre': placed,
+        'image_size': placed,
     }.get(name, True)
 
 
@@ -209,3 +247,7 @@ class QHRelaxSceneSettings(RelaxProperties, bpy.types.PropertyGroup):
 
 class QHStraightenSceneSettings(StraightenProperties, bpy.types.PropertyGroup):
     """The same for straightening."""
+
+
+class QHHeatSceneSettings(HeatProperties, bpy.types.PropertyGroup):
+    """The same for the heatmap."""

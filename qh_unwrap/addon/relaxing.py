@@ -11,8 +11,7 @@ from ..core.regions import Connected, Selection
 from ..core.relaxing import relax_islands, rim, straighten_islands
 from ..core.stepping import mapped
 from ..core.straightening import Polygons, rectangle, straight_lines
-from . import judging, mesh_arrays, modes, stacking
-from .last_run import last_run
+from . import judging, mesh_arrays, modes, stacking, texels
 from .outcome import Outcome
 from .selection import Target
 from .unwrapping import are_as_read, keep, write
@@ -148,10 +147,8 @@ def _carried_out(works, improved, settings, options, context):
             with modes.in_object_mode(context):
                 for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
                     write(obj, list(group))
-    outcomes = [work.outcome for work in works]
-    if outcomes:
-        last_run.remember(outcomes, settings, options)
-    return outcomes
+        texels.note([work for work in placed if work.uv is not None], context)
+    return [work.outcome for work in works]
 
 
 def _relaxed(works, settings):
@@ -182,7 +179,8 @@ def _can_be_read(work, settings):
 
 def _shape(work, outlines=None):
     walls = None if outlines is None else outlines.beside(work)
-    return Shape(work.vertices, work.triangles, work.raw_uv, ~work.moving, face=work.triangle_faces, walls=walls)
+    its = dict(face=work.triangle_faces, importance=work.importance, walls=walls)
+    return Shape(work.vertices, work.triangles, work.raw_uv, ~work.moving, **its)
 
 
 class _Outlines:

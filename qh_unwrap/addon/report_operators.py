@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..core import UnwrapError
-from . import jobs, telling
+from . import jobs, selecting, telling
 from .last_run import last_run
 from .running import InSteps
 from .selection import Target
@@ -57,8 +57,7 @@ class QH_OT_select(_OfLastResult, bpy.types.Operator):
         if problem:
             self.report({'ERROR'}, problem)
             return {'CANCELLED'}
-        _edit(obj, context)
-        _select_faces(obj, outcome.face_indices.tolist())
+        selecting.select_faces({obj: outcome.face_indices}, context)
         return {'FINISHED'}
 
 
@@ -66,7 +65,7 @@ def _problem(name, obj, outcomes):
     """Why the object does not have the outcomes' faces any more, and the cure; nothing if it has."""
     if obj is None or obj.type != 'MESH':
         return f"There is no mesh object {name} in this view layer any more: unwrap again"
-    if _face_count(obj) <= max(outcome.face_indices.max() for outcome in outcomes):
+    if face_count(obj) <= max(outcome.face_indices.max() for outcome in outcomes):
         return f"{name} has fewer faces than when it was unwrapped: unwrap again"
     return ""
 
@@ -80,48 +79,15 @@ def targets_of(outcomes, context):
         problem = _problem(name, obj, group)
         if problem:
             return [], problem
-        faces = np.zeros(_face_count(obj), dtype=bool)
+        faces = np.zeros(face_count(obj), dtype=bool)
         faces[np.concatenate([outcome.face_indices for outcome in group])] = True
         targets.append(Target(obj, faces))
     return targets, ""
 
 
-def _face_count(obj):
+def face_count(obj):
+    """How many faces the object has, in any mode."""
     return len(bmesh.from_edit_mesh(obj.data).faces) if obj.mode == 'EDIT' else len(obj.data.polygons)
-
-
-def _edit(obj, context):
-    """Enter Edit Mode in face mode, with this object if it is not among those that are edited."""
-    objects = context.view_layer.objects
-    if obj.mode != 'EDIT':
-        if context.mode == 'EDIT_MESH':
-            bpy.ops.object.mode_set(mode='OBJECT')
-        for other in list(objects.selected):
-            other.select_set(False)
-        obj.select_set(True)
-        objects.active = obj
-        bpy.ops.object.mode_set(mode='EDIT')
-    objects.active = obj
-    context.tool_settings.mesh_select_mode = (False, False, True)
-    bpy.ops.mesh.select_all(action='DESELECT')
-
-
-def _select_faces(obj, indices):
-    """Select these faces, also for the UV Editor, where UVs have a selection of their own."""
-    bm = bmesh.from_edit_mesh(obj.data)
-    bm.faces.ensure_lookup_table()
-    uv_layer = bm.loops.layers.uv.active
-    faces = [bm.faces[index] for index in indices]
-    for face in faces:
-        face.hide_set(False)
-        face.select_set(True)
-        if uv_layer is not None and bpy.app.version < (5, 0, 0):
-            for loop in face.loops:
-                loop[uv_layer].select = loop[uv_layer].select_edge = True
-    bm.faces.active = faces[0]
-    if bpy.app.version >= (5, 0, 0):
-        bm.uv_select_sync_from_mesh()
-    bmesh.update_edit_mesh(obj.data)
 
 
 class QH_OT_pack_overlapping(bpy.types.Operator):

@@ -23,6 +23,12 @@ def mesh_objects(context):
     return []
 
 
+def shown_meshes(context):
+    """The same to look at: every object of a mesh, linked ones too."""
+    objects = context.objects_in_mode if context.mode == 'EDIT_MESH' else context.selected_objects
+    return [obj for obj in objects if obj.type == 'MESH']
+
+
 def distinct_meshes(objects):
     """The first object of each mesh that can be changed."""
     found = {}
@@ -66,6 +72,17 @@ def visible_faces(mesh):
     hidden = np.zeros(len(mesh.polygons), dtype=bool)
     mesh.polygons.foreach_get("hide", hidden)
     return ~hidden
+
+
+def without_group(targets, name):
+    """Why none of the targets has the vertex group, and the cure; nothing if one has it."""
+    if any(target.obj.vertex_groups.get(name) for target in targets):
+        return ""
+    return f"There is no vertex group {name}: paint one, choose another, or turn the importance weights off"
+
+
+def all_faces(mesh):
+    return np.ones(len(mesh.polygons), dtype=bool)
 
 
 def _selected(obj, context):

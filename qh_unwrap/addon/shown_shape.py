@@ -2,7 +2,8 @@
 """Where an object shows its vertices: with its shape keys and, if wanted, its Subdivision Surface modifier."""
 
 import bpy
-import numpy as np
+
+from .bulk import coordinates
 
 _NAME = "QH Unwrap"
 
@@ -20,7 +21,7 @@ def shown_vertices(obj, mesh, use_subsurf):
     modifier = next((one for one in obj.modifiers if one.type == 'SUBSURF' and one.show_viewport), None)
     modifier = modifier if use_subsurf else None
     if not obj.data.shape_keys:
-        return _coordinates(mesh) if modifier is None else _evaluated(obj, mesh.copy(), modifier)
+        return coordinates(mesh) if modifier is None else _evaluated(obj, mesh.copy(), modifier)
     if obj.mode == 'EDIT':
         obj.update_from_editmode()  # the keys, too
     return _evaluated(obj, obj.data.copy(), modifier)
@@ -44,13 +45,7 @@ def _evaluated(obj, mesh, modifier):
                     setattr(alone, setting.identifier, getattr(modifier, setting.identifier))
         view_layer = scene.view_layers[0]
         view_layer.update()
-        return _coordinates(twin.evaluated_get(view_layer.depsgraph).data)[:count]  # a modifier's new ones come last
+        return coordinates(twin.evaluated_get(view_layer.depsgraph).data)[:count]  # a modifier's new ones come last
     finally:
         bpy.data.scenes.remove(scene)
         bpy.data.meshes.remove(mesh)
-
-
-def _coordinates(mesh):
-    values = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", values)
-    return values.reshape(-1, 3)

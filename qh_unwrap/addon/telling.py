@@ -2,7 +2,8 @@
 """What operators report of a run."""
 
 from . import cutting
-from .outcome import error_sentences, listed, sentences, summary
+from .last_run import last_run
+from .outcome import check_summary, error_sentences, listed, sentences, summary
 
 
 def tell(operator, outcomes, cuts):
@@ -16,6 +17,15 @@ def tell(operator, outcomes, cuts):
         return {'CANCELLED'}
     clean = not failed and all(outcome.is_clean for outcome in outcomes)
     operator.report({'INFO'} if clean else {'WARNING'}, summary(outcomes))
+    return {'FINISHED'}
+
+
+def tell_of_check(operator, outcomes):
+    """Report what a check found; returns what the operator returns."""
+    for sentence, _ in (*last_run.errors, *last_run.lines):
+        operator.report({'INFO'}, sentence)
+    clean = not last_run.found('LOOK')
+    operator.report({'INFO'} if clean else {'WARNING'}, check_summary(outcomes))
     return {'FINISHED'}
 
 

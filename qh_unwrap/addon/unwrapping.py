@@ -8,14 +8,13 @@ from collections.abc import Generator, Sequence
 import bpy
 import numpy as np
 
-from ..core import Settings, Shape, UnwrapError, placing, unwrap_islands
+from ..core import Settings, Shape, UnwrapError, unwrap_islands
 from ..core.course import PINS_CROSS
 from ..core.errors import BoundaryError, ClosedError, GenusError, UVError
 from ..core.islands import attached, find_islands
 from ..core.stepping import mapped
-from . import judging, layout, mesh_arrays, modes, stacking
+from . import judging, layout, mesh_arrays, modes, stacking, texels
 from .hints import hint_at_seams
-from .last_run import last_run
 from .options import MeshOptions
 from .outcome import Outcome, count
 from .selection import Target
@@ -50,9 +49,8 @@ def unwrap_targets(
             with modes.in_object_mode(context):
                 for obj, group in itertools.groupby(placed, key=lambda work: work.target.obj):
                     write(obj, list(group), cuts.get(obj))
-    outcomes = [work.outcome for work in works]
-    last_run.remember(outcomes, settings, options)
-    return outcomes
+            texels.note(placed, context)
+    return [work.outcome for work in works]
 
 
 _UNWRAPPING = 0.9  # of all the work, by and large; the rest is to see what lies on what
@@ -75,6 +73,7 @@ def _placed(works, options, context):
     yield _UNWRAPPING
     layout.place([work for work in works if work.uv is not None], works, options, context)
     yield _UNWRAPPING
+    _tell_of_density(works, options)
     placed = [work for work in works if work.uv is not None]
     judging.judge(placed)
     yield from mapped(lambda _: _UNWRAPPING, hint_at_seams(placed))
@@ -82,6 +81,14 @@ def _placed(works, options, context):
         rest = 1 - _UNWRAPPING
         yield from mapped(lambda share: _UNWRAPPING + rest * share, stacking.report_overlaps(placed, works, options))
     return placed
+
+
+def _tell_of_density(works, options):
+    """Warn of islands that cannot get the texel density that is given, since something of them is held."""
+    if options.texel_density == 'GIVEN':
+        for work in works:
+            if work.in_frame and work.uv is not None:
+                work.outcome.warnings += ("its texel density stays, since pins or its outline hold it",)
 
 
 def _works(target, mesh, settings):
@@ -140,7 +147,7 @@ def _shape(work):
     if work.found_uv is not None and settings.boundary == 'FREE' and settings.initial == 'AUTO' and not pinned.any():
         # A start that is valid: another one may not lead to a map that is.
         settings = dataclasses.replace(settings, initial='CURRENT', iterations=0)
-        return settings, Shape(work.vertices, work.triangles, work.found_uv, face=work.triangle_faces)
+        return settings, _made_shape(work, work.found_uv)
     if work.is_attached:
         if settings.boundary == 'FREE':
             pinned = pinned | work.attached_vertices
@@ -159,7 +166,12 @@ def _shape(work):
             raise UVError(text + (_HANGS if work.is_attached else ""))
         uv = None
     pinned = pinned if pinned.any() else None
-    return settings, Shape(work.vertices, work.triangles, uv, pinned, face=work.triangle_faces)
+    return settings, _made_shape(work, uv, pinned)
+
+
+def _made_shape(work, uv, pinned=None):
+    its = dict(face=work.triangle_faces, importance=work.importance)
+    return Shape(work.vertices, work.triangles, uv, pinned, **its)
 
 
 def _without_uvs(settings):
@@ -225,9 +237,6 @@ def write(obj, works, cut=None):
         return
     if cut is not None:
         _mark(cut, works)
-    areas = placing.areas([(work.vertices, work.triangles) for work in works])
-    for work, area in zip(works, areas.tolist(), strict=True):
-        work.outcome.area = area
 
 
 def _mark(cut, works):

@@ -33,6 +33,7 @@ class Work:
     in_frame: bool = False  # of the old UVs, because something of them is held
     has_new_seams: bool = False  # so that its old place says nothing
     cut_fault: str = ""  # why no seams were found that open it
+    scale: float | None = None  # how long a unit of its surface shall be in the new map, if that is chosen
     found_uv: np.ndarray | None = None  # (n, 2) those that the search for these seams ended with
     moving: np.ndarray | None = None  # (n,) bool, which vertices may move where not all of them may
     straight: Straight | None = None  # what is to be straight in it
@@ -50,6 +51,11 @@ class Work:
     def image(self):
         """What most of its faces show: what shows the same shares the UVs."""
         return self.mesh.image_of(self.island.faces)
+
+    @cached_property
+    def picture(self):
+        """The `Picture` that most of its faces show, None for none."""
+        return self.mesh.pictures[self.mesh.slot_of(self.island.faces)]
 
     @cached_property
     def old_uv(self):
@@ -113,6 +119,13 @@ class Work:
     @cached_property
     def vertices(self):
         return self.mesh.vertices[self.island.vertices]
+
+    @cached_property
+    def importance(self):
+        """(t,) how many times as large each triangle shall be as one without weights, None if all shall be alike."""
+        if self.mesh.importance is None:
+            return None
+        return np.exp(self.mesh.importance[self.island.vertices][self.triangles].mean(axis=1))
 
     @property
     def polygons(self):

@@ -160,12 +160,24 @@ class Batched:
             raise UVError("vertices that keep their distance need UVs, and there are none")
         if shape.face is not None and np.shape(shape.face) != (len(triangles),):
             raise ShapeError(f"there must be a face for each of the {len(triangles)} triangles")
+        importance = checked_importance(len(triangles), shape.importance)
         if n <= locality.MANY:
-            return Shape(vertices, triangles, uv, pinned, partner, None, start, shape.crossing, shape.walls)
+            return Shape(vertices, triangles, uv, pinned, partner, None, importance, start, shape.crossing, shape.walls)
         mesh = self._sorted[k] = locality.Sorted(vertices, triangles)
         partner = None if partner is None else mesh.renumbered(partner)
+        importance = mesh.sorted_triangles(importance)
         uv, pinned, start = (mesh.sorted(values) for values in (uv, pinned, start))
-        return Shape(mesh.vertices, mesh.triangles, uv, pinned, partner, None, start, shape.crossing, shape.walls)
+        return Shape(
+            mesh.vertices,
+            mesh.triangles,
+            uv,
+            pinned,
+            partner,
+            importance=importance,
+            start=start,
+            crossing=shape.crossing,
+            walls=shape.walls,
+        )
 
     def _joined(self, shapes, settings):
         while shapes:
@@ -176,7 +188,8 @@ class Batched:
             if not faults:
                 vertices, faults = normalised_pieces(vertices, topology)
             if not faults:
-                return _batch(shapes, Surface.of_topology(vertices, topology), settings)
+                surface = Surface.of_topology(vertices, topology, _joined_importance(shapes))
+                return _batch(shapes, surface, settings)
             index = list(shapes)
             for piece, error in faults.items():
                 k = index[piece]
@@ -185,6 +198,14 @@ class Batched:
                 self.errors[k] = error
                 del shapes[k]
         return None
+
+
+def _joined_importance(shapes):
+    """That of all triangles, None where all count alike."""
+    if all(shape.importance is None for shape in shapes.values()):
+        return None
+    its = (np.ones(len(each.triangles)) if each.importance is None else each.importance for each in shapes.values())
+    return np.concatenate(list(its))
 
 
 def _batch(shapes, surface, settings):
@@ -237,3 +258,13 @@ def checked_pins(n: int, pinned: np.ndarray | None) -> np.ndarray | None:
     if pinned.shape not in ((n,), (n, 2)) or pinned.dtype != bool:
         raise PinError(f"the pins must be True or False for each of the {n} vertices, or for U and V of each")
     return np.column_stack([pinned, pinned]) if pinned.ndim == 1 else pinned
+
+
+def checked_importance(m: int, importance: np.ndarray | None) -> np.ndarray | None:
+    """The importance of triangles as an array (m,), None where all have the same; raises `ShapeError`."""
+    if importance is None:
+        return None
+    importance = np.asarray(importance, dtype=np.float64)
+    if importance.shape != (m,) or not (np.isfinite(importance) & (importance > 0)).all():
+        raise ShapeError(f"the importance must be a positive number for each of the {m} triangles")
+    return importance if np.ptp(importance) else None

@@ -39,6 +39,11 @@ class Chart(HalfEdges):
         self.piece, self.piece_count = piece, piece_count
 
     @property
+    def in_space(self) -> Chart:
+        """The chart with its true shapes, for measures, where those at rest are others."""
+        return self
+
+    @property
     def is_air(self) -> bool:
         return self.rest is None
 
@@ -108,7 +113,8 @@ class Surface(Chart):
     """A connected, orientable, manifold triangle surface of genus 0 with at least one boundary loop; or several.
 
     It is checked once, when it is made; everything after it trusts it.  As a chart its shapes at rest are those in
-    space, laid flat.
+    space, laid flat; where triangles have an importance, they are scaled by its root, so that the map gives them more
+    room.
 
     Parameters
     ----------
@@ -125,6 +131,7 @@ class Surface(Chart):
     loops : list of boundary loops, each in the direction of its triangles' winding: first one for each piece, its
         outline, then all holes
     loop_piece : (l,), the piece of every loop
+    scaled : (m,), by what the shapes at rest were multiplied, or None
 
     Raises a subclass of `SurfaceError`, one for each cause.
     """
@@ -139,13 +146,16 @@ class Surface(Chart):
         self._fill(normalised, topology)
 
     @classmethod
-    def of_topology(cls, vertices: np.ndarray, topology: Topology) -> Surface:
-        """The same from vertices as `normalised_pieces` returns them and a topology without faults."""
+    def of_topology(cls, vertices: np.ndarray, topology: Topology, importance: np.ndarray | None = None) -> Surface:
+        """The same from vertices as `normalised_pieces` returns them and a topology without faults.
+
+        `importance` (m,) says how many times as large a triangle shall be in the map.
+        """
         made = cls.__new__(cls)
-        made._fill(vertices, topology)
+        made._fill(vertices, topology, importance)
         return made
 
-    def _fill(self, vertices, topology):
+    def _fill(self, vertices, topology, importance=None):
         triangles = topology.triangles
         self.vertices = vertices
         self.vertex_piece = topology.vertex_piece
@@ -155,12 +165,26 @@ class Surface(Chart):
         p = topology.piece_count
         size = np.sqrt(p / len(triangles))  # every piece has the area 1
         rest, degenerate = laid_flat(vertices, triangles, size)
+        self.scaled = None
+        if importance is not None:
+            self.scaled = _scales(importance, signed_areas(rest), topology.triangle_starts, topology.triangle_piece)
+            rest = np.asfortranarray((rest.T * self.scaled).T)
         area = signed_areas(rest)
         measure, barrier = np.where(degenerate, 0.0, area), np.where(degenerate, _UNSEEN * area, area)
         super().__init__(
             triangles, topology.edges, topology.triangle_edges, rest, measure, barrier, topology.triangle_piece, p
         )
         self.area = area
+
+    @cached_property
+    def in_space(self) -> Chart:
+        """The chart with the shapes that triangles have in space, for measures, where those at rest are scaled."""
+        if self.scaled is None:
+            return self
+        rest, measure = (self.rest.T / self.scaled).T, self.measure / self.scaled**2
+        return Chart(
+            self.triangles, self.edges, self.triangle_edges, rest, measure, measure, self.piece, self.piece_count
+        )
 
     @property
     def degenerate(self) -> np.ndarray:
@@ -245,6 +269,7 @@ class Surface(Chart):
             piece=new_piece[self.piece[chosen]],
             piece_count=int(pieces.sum()),
         )
+        made.scaled = None if self.scaled is None else self.scaled[chosen]
         made.vertices = np.asfortranarray(self.vertices[chosen_vertices])
         made.vertex_piece = new_piece[self.vertex_piece[chosen_vertices]]
         made.vertex_starts, made.triangle_starts = (
@@ -277,6 +302,7 @@ class Surface(Chart):
             np.zeros(its.stop - its.start, np.int64),
             1,
         )
+        made.scaled = None if self.scaled is None else self.scaled[its]
         made.vertices = self.vertices[first:end]
         made.vertex_piece = np.zeros(end - first, np.int64)
         made.vertex_starts = made.triangle_starts = np.zeros(1, np.int64)
@@ -338,6 +364,12 @@ def normalised_pieces(vertices: np.ndarray, topology: Topology) -> tuple[np.ndar
         for k in np.flatnonzero(~(area > 1e-14)).tolist()
     }
     return centred / np.sqrt(np.where(area > 1e-14, area, 1))[piece, None], faults
+
+
+def _scales(importance, area, starts, piece):
+    """What to multiply the shapes of triangles with so that their areas are as the importance says, and add up to 1."""
+    total = np.add.reduceat(area * importance, starts) / np.add.reduceat(area, starts)
+    return np.sqrt(importance / total[piece])
 
 
 def _sorted_loops(vertices, topology):

@@ -2,15 +2,18 @@
 """How a map distorts a surface, area-weighted on the surface and independent of the map's overall scale."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .certificate import orientation
-from .chart import Surface
-from .errors import UVError
+from .chart import Chart, Surface
+from .errors import ShapeError, UVError
+from .pieces import starts_of_numbers
 from .tensor import squared_stretches
-from .triangles import by_parts
+from .triangles import areas_of, boxes_of, by_parts, laid_flat, signed_areas
 
 _PER_TRIANGLE = {"per_triangle": True}  # marks the fields that are arrays (m,)
 
@@ -47,23 +50,108 @@ def measure(surface: Surface, uv: np.ndarray) -> Distortion:
     return measure_pieces(surface, uv)[0]
 
 
-def measure_pieces(surface: Surface, uv: np.ndarray) -> list[Distortion]:
-    """The `Distortion` of every piece's map."""
-    larger, smaller, *_ = squared_stretches(surface, uv, smallest=1e-100)
-    share = surface.measure / surface.sums(surface.measure)[surface.piece]
+def measure_pieces(chart: Chart, uv: np.ndarray) -> list[Distortion]:
+    """The `Distortion` of every piece's map, beside the shapes that triangles have in space."""
+    return _by_pieces(chart.in_space, *_fields(chart.in_space, uv))
+
+
+def _fields(chart, uv):
+    """Stretch, angle, logarithm of the area, orientation, energy and squared stretch of every triangle, (m,) each."""
+    larger, smaller, *_ = squared_stretches(chart, uv, smallest=1e-100)
     squared, dirichlet, angle, log_area = by_parts(_measures, larger, smaller)
-    sign = orientation(uv, surface.triangles)
-    sign[(sign == 0) & surface.degenerate] = 1
+    sign = orientation(uv, chart.triangles)
+    sign[(sign == 0) & (chart.measure == 0)] = 1
+    return np.sqrt(squared), angle, log_area, sign, dirichlet, squared
+
+
+def _by_pieces(chart, stretch, angle, log_area, sign, dirichlet, squared):
+    total = chart.sums(chart.measure)
+    share = chart.measure / np.where(total > 0, total, 1)[chart.piece]
     numbers = (
-        np.sqrt(surface.sums(share * squared)).tolist(),
-        surface.sums(share * dirichlet).tolist(),
-        surface.sums(share * angle).tolist(),
-        np.sqrt(surface.sums(share * log_area**2)).tolist(),
-        surface.sums((sign < 0).astype(int)).tolist(),
-        surface.sums((sign == 0).astype(int)).tolist(),
+        np.sqrt(chart.sums(share * squared)).tolist(),
+        chart.sums(share * dirichlet).tolist(),
+        chart.sums(share * angle).tolist(),
+        np.sqrt(chart.sums(share * log_area**2)).tolist(),
+        chart.sums((sign < 0).astype(int)).tolist(),
+        chart.sums((sign == 0).astype(int)).tolist(),
     )
-    arrays = (np.split(each, surface.triangle_starts[1:]) for each in (np.sqrt(squared), angle, log_area, sign))
+    ends = [*starts_of_numbers(chart.piece, chart.piece_count).tolist(), len(sign)]
+    arrays = ([field[start:end] for start, end in pairwise(ends)] for field in (stretch, angle, log_area, sign))
     return [Distortion(*values) for values in zip(*numbers, *arrays, strict=True)]
+
+
+class Measured(NamedTuple):
+    """How any UVs distort."""
+
+    islands: list[Distortion]
+    """Of each island, by its own scale."""
+    whole: Distortion
+    """Of all together, as if they were one."""
+    mirrored: np.ndarray
+    """(k,) bool, the islands that are mirrored as a whole: their flips are counted the other way round."""
+    orientation: np.ndarray
+    """(m,), -1 for triangles that are flipped in their islands, 0 for collapsed ones, else 1."""
+    energy: np.ndarray
+    """(m,), the symmetric Dirichlet energy of every triangle, by its island's scale; ideal 1."""
+
+
+def measure_corners(points: np.ndarray, uv: np.ndarray, island: np.ndarray | None = None) -> Measured:
+    """How any UVs distort, valid or not, island by island.
+
+    points  (m, 3, 3), the corners of triangles in space, any unit
+    uv      (m, 3, 2), those in the map; triangles need not hang together, and each may have UVs of its own
+    island  (m,), the island of each triangle, ascending from 0 without gaps; by default all are one
+
+    A triangle is flipped if it lies against most of the area of its island.  Raises `UVError` for UVs that are no
+    numbers, `ShapeError` for arrays that do not fit.
+    """
+    points, uv = np.asarray(points, dtype=np.float64), np.asarray(uv, dtype=np.float64)
+    if not len(uv) or points.shape != (len(uv), 3, 3) or uv.shape[1:] != (3, 2):
+        raise ShapeError(f"there must be corners (m, 3, 3) and UVs (m, 3, 2), not {points.shape} and {uv.shape}")
+    checked_uv(3 * len(uv), uv.reshape(-1, 2))
+    chart, size = _loose_triangles(points, np.zeros(len(uv), dtype=int) if island is None else np.asarray(island))
+    mirrored = chart.sums(signed_areas(uv)) < 0
+    seen = np.asfortranarray((np.where(mirrored[chart.piece, None, None], (-1, 1), 1) * uv).reshape(-1, 2))
+    fields = _fields(chart, seen)
+    islands = _by_pieces(chart, *fields)
+    if len(islands) == 1:
+        whole = islands[0]
+    else:
+        its = (size / size.max())[chart.piece]
+        rest, measure = chart.rest * its[:, None, None], chart.measure * its**2
+        one = np.zeros(len(uv), dtype=int)
+        (whole,) = measure_pieces(Chart(chart.triangles, _NOBODY, _NOBODY, rest, measure, measure, one, 1), seen)
+    return Measured(islands, whole, mirrored, fields[3], fields[4])
+
+
+def _loose_triangles(points, island):
+    """Triangles (m, 3, 3) in space as a chart that knows no neighbours: corner c of triangle t is the vertex 3 t + c.
+
+    `island` (m,) ascends; every island is scaled so that its area is 1.  Also returns how large it was, (k,).
+    """
+    starts = starts_of_numbers(island, int(island[-1]) + 1)
+
+    def sums(values):
+        return np.add.reduceat(values, starts, axis=0)
+
+    a, b, c = points.swapaxes(0, 1)
+    middle = sums(a + b + c) / (3 * sums(np.ones(len(points))))[:, None]
+    centred = points - middle[island, None]
+    low, high = boxes_of(centred)
+    extent = np.maximum(np.maximum.reduceat(high, starts), -np.minimum.reduceat(low, starts)).max(axis=1)
+    size = np.where(extent > 0, extent, 1)
+    area = sums(areas_of(centred)) / size**2
+    there = area > _NOTHING
+    size *= np.sqrt(np.where(there, area, 1))
+    centred /= size[island, None, None]
+    triangles = np.asfortranarray(np.arange(3 * len(points)).reshape(-1, 3))
+    rest, degenerate = laid_flat(centred.reshape(-1, 3), triangles, np.sqrt(len(starts) / len(points)))
+    measure = np.where(degenerate | ~there[island], 0.0, signed_areas(rest))
+    return Chart(triangles, _NOBODY, _NOBODY, rest, measure, measure, island, len(starts)), size
+
+
+_NOTHING = 1e-14  # of the square of its extent, the area up to which an island has none
+_NOBODY = np.zeros((0, 2), dtype=int)
 
 
 def _measures(larger, smaller):

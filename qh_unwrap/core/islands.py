@@ -15,11 +15,9 @@ from itertools import pairwise
 import numpy as np
 
 from .doubles import find_doubles
-from .pieces import around_faces, components, first_and_last
+from .joints import across_edges, meet, uv_vertices, without_doubled_diagonals, wound_back
+from .pieces import around_faces, components
 from .winding import agreed
-
-_SMALL = 1e-4  # of an edge's length in the map, up to which a gap there is none
-_ROUNDING = 4 * float(np.finfo(np.float32).eps)  # of a UV, by which its copies may differ
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ def find_islands(
     if cut.any():
         one, start, end = (each[~cut] for each in (one, start, end))
     uv_vertex = uv_vertices(one, start, end, following)
-    triangles = _without_doubled_diagonals(corner_triangles, following, uv_vertex)
+    triangles = without_doubled_diagonals(corner_triangles, following, uv_vertex)
 
     uv_vertex[doubles.corners] = uv_vertex[doubles.twins]
     face_island[doubles.faces] = face_island[doubles.twin_faces]
@@ -81,7 +79,7 @@ def find_islands(
     triangle_face = corner_face[corner_triangles[:, 0]]
     drawn = corner_triangles
     if backward.any():
-        triangles, drawn = (_turned(each, backward[triangle_face]) for each in (triangles, drawn))
+        triangles, drawn = (wound_back(each, backward[triangle_face]) for each in (triangles, drawn))
 
     rank, count = _ranks(face_island, selected)
     corner_rank, triangle_rank = rank[corner_face], rank[triangle_face]
@@ -147,11 +145,6 @@ def _crowded_edges(edges, ranks, seam, count):
     return np.bincount(pairs // len(seam), minlength=count).tolist()
 
 
-def _turned(triangles, backward):
-    """The triangles (t, 3), those that are `backward`, (t,) bool, run the other way round."""
-    return np.where(backward[:, None], triangles[:, [0, 2, 1]], triangles)
-
-
 def cuts(
     corner_vertex: np.ndarray, corner_edge: np.ndarray, face_start: np.ndarray, edge_count: int, uv: np.ndarray
 ) -> np.ndarray:
@@ -159,7 +152,7 @@ def cuts(
     seam, everything = np.zeros(edge_count, dtype=bool), np.ones(len(face_start), dtype=bool)
     following, (one, start, end) = _neighbours(corner_vertex, corner_edge, face_start, seam, everything)
     cut = np.zeros(edge_count, dtype=bool)
-    cut[corner_edge[one[~meeting(uv, one, start, end, following)]]] = True
+    cut[corner_edge[one[~meet(uv, one, start, end, following)]]] = True
     return cut
 
 
@@ -176,7 +169,7 @@ def attached(
     A doubled face that is not selected holds nothing, nor does it count as one that hangs there.
     """
     following, (one, start, end) = _neighbours(corner_vertex, corner_edge, face_start, seam, selected)
-    joined = meeting(uv, one, start, end, following)
+    joined = meet(uv, one, start, end, following)
     uv_vertex = uv_vertices(one[joined], start[joined], end[joined], following)
     is_selected = selected[around_faces(face_start, len(corner_vertex))[0]]
     unselected_there = np.bincount(uv_vertex, weights=~is_selected) > 0
@@ -189,76 +182,6 @@ def _neighbours(corner_vertex, corner_edge, face_start, seam, selected):
     doubles = find_doubles(corner_vertex, corner_edge, face_start, seam, selected)
     corners = np.flatnonzero(~doubles.among(len(face_start))[corner_face])
     return following, across_edges(corner_vertex, corner_edge, following, seam, corners)[:3]
-
-
-def meeting(uv: np.ndarray, one: np.ndarray, start: np.ndarray, end: np.ndarray, following: np.ndarray) -> np.ndarray:
-    """Whether the UVs of two faces are the same along each of the edges that `across_edges` returns, (k,) bool.
-
-    They may differ by some rounding, and by a small part of the edge's length.
-    """
-    corners = np.column_stack([one, following[one], start, end])
-    meet = (uv[corners[:, :2]] == uv[corners[:, 2:]]).all(axis=(1, 2))
-    different = np.flatnonzero(~meet)
-    here, there = uv[corners[different, :2]], uv[corners[different, 2:]]
-    with np.errstate(invalid="ignore", over="ignore"):
-        length = np.abs(here[:, 0] - here[:, 1]).max(axis=1)
-        size = np.abs(np.hstack([here, there])).max(axis=(1, 2))
-        meet[different] = np.abs(here - there).max(axis=(1, 2)) <= _SMALL * length + _ROUNDING * size
-    return meet
-
-
-def across_edges(
-    corner_vertex: np.ndarray, corner_edge: np.ndarray, following: np.ndarray, seam: np.ndarray, corners: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Three corners for every edge that joins two faces, (k,) each: that of one face that starts the edge, and those of
-    the other face at the edge's start and end; and whether both run along it the same way, so that one of the faces is
-    inside out, (k,) bool."""
-    uses = np.bincount(corner_edge[corners], minlength=len(seam))
-    inner = (uses == 2) & ~seam
-    one, other = (each[inner] for each in first_and_last(corners, corner_edge[corners], len(seam)))
-    opposed = corner_vertex[one] == corner_vertex[other]
-    return one, np.where(opposed, other, following[other]), np.where(opposed, following[other], other), opposed
-
-
-def uv_vertices(one: np.ndarray, start: np.ndarray, end: np.ndarray, following: np.ndarray) -> np.ndarray:
-    """The UV vertex of each corner, (c,), where faces hang together across the edges that `across_edges` returns."""
-    return components(len(following), np.concatenate([one, following[one]]), np.concatenate([start, end]))[1]
-
-
-def _without_doubled_diagonals(triangles, following, uv_vertex):
-    """Triangles (t, 3) of the same faces, of which no two faces have a diagonal between the same two vertices.
-
-    Faces are triangulated one by one, so where two of them share several edges in a row, both may be cut along the
-    same diagonal, and the triangles beside it would lie on top of each other.  Such diagonals are flipped.
-    """
-    if 3 * len(triangles) == len(following):
-        return triangles  # all faces are triangles: there are no diagonals
-    for _ in range(8):
-        halves = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-        start, end = uv_vertex[halves].T
-        key = np.minimum(start, end) * np.int64(uv_vertex.max() + 1) + np.maximum(start, end)
-        ordered = np.sort(key)
-        if (ordered[2:] != ordered[:-2]).all():
-            break
-        _, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
-        is_diagonal = halves[:, 1] != following[halves[:, 0]]
-        doubled = np.flatnonzero(is_diagonal & (uses[edge] > 2))
-        if not len(doubled):
-            break
-        triangles = _flipped(triangles, {tuple(halves[row]): row for row in doubled})
-    return triangles
-
-
-def _flipped(triangles, rows):
-    """The triangles after flipping diagonals, given as {(corner, corner): 3 * triangle + place}, both ways round."""
-    triangles, touched = triangles.copy(), set()
-    for (i, j), row in rows.items():
-        one, other = row // 3, rows[j, i] // 3
-        if not touched & {one, other}:
-            k, h = triangles[one, (row + 2) % 3], triangles[other, (rows[j, i] + 2) % 3]
-            triangles[one], triangles[other] = (h, j, k), (h, k, i)
-            touched |= {one, other}
-    return triangles
 
 
 def _grouped(items, rank, count):

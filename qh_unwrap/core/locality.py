@@ -43,6 +43,10 @@ class Sorted:
         """Numbers of vertices (n, ...), given for every vertex, as sorted numbers for every sorted vertex."""
         return self._place[vertices][self._order]
 
+    def sorted_triangles(self, values: np.ndarray | None) -> np.ndarray | None:
+        """Values (m, ...) at the triangles in the sorted order; None for None."""
+        return None if values is None else np.asarray(values)[self._triangle_order]
+
     def own_triangles(self, triangles: np.ndarray) -> np.ndarray:
         """The numbers that sorted triangles, given by their numbers (k,), have in the mesh's own order."""
         return self._triangle_order[triangles]

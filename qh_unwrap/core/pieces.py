@@ -18,6 +18,11 @@ def numbers(starts: np.ndarray, count: int) -> np.ndarray:
     return np.repeat(np.arange(len(starts)), np.diff(starts, append=count))
 
 
+def starts_of_numbers(number: np.ndarray, count: int) -> np.ndarray:
+    """Where the items of each of `count` pieces begin, (count,), of items (k,) whose pieces' numbers ascend."""
+    return np.searchsorted(number, np.arange(count))
+
+
 def around_faces(face_start: np.ndarray, corner_count: int) -> tuple[np.ndarray, np.ndarray]:
     """The face of each corner, (c,), and the corner that follows it around that face, (c,).
 

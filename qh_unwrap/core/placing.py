@@ -39,13 +39,13 @@ def in_place(uv: np.ndarray, triangles: np.ndarray, old: np.ndarray) -> np.ndarr
         sound = growth <= _THROWN * np.median(growth[growth > 0])
         new, old = new[sound], old[sound]
     area, old_area = (float(np.abs(signed_areas(each)).sum()) for each in (new, old))
-    centre, old_centre = _centre(new), _centre(old)
-    z, w = ((each.reshape(-1, 2) - middle) @ (1, 1j) for each, middle in ((new, centre), (old, old_centre)))
+    middle, old_middle = centre(new), centre(old)
+    z, w = ((each.reshape(-1, 2) - its) @ (1, 1j) for each, its in ((new, middle), (old, old_middle)))
     rotation = np.vdot(z, w)
     rotation = rotation / abs(rotation) if abs(rotation) > 1e-9 * np.linalg.norm(z) * np.linalg.norm(w) else 1.0
     size = np.sqrt(old_area / area) if area > 0 else 1.0
-    moved = (uv - centre) @ (1, 1j) * rotation * size
-    return np.column_stack([moved.real, moved.imag]) + old_centre
+    moved = (uv - middle) @ (1, 1j) * rotation * size
+    return np.column_stack([moved.real, moved.imag]) + old_middle
 
 
 def is_mirrored(corners: np.ndarray) -> bool:
@@ -128,15 +128,20 @@ def in_unit_square(uv: np.ndarray) -> np.ndarray:
 
 
 def to_scale(
-    islands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    islands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], importance: np.ndarray | None = None
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """The UVs of islands, each given as (uv, vertices, triangles), scaled to the same texel density and about the area
-    1 all together; and which, (k,) bool, are larger, since single precision could not tell their vertices apart."""
+    1 all together; and which, (k,) bool, are larger, since single precision could not tell their vertices apart.
+
+    `importance` (k,) is what the islands' areas count times, by default 1.
+    """
     uvs, vertices, triangles = (list(each) for each in zip(*islands, strict=True))
     in_space, in_layout = (
         areas(list(zip(vertices, triangles, strict=True))),
         uv_areas(list(zip(uvs, triangles, strict=True))),
     )
+    if importance is not None:
+        in_space = in_space * importance
     share = in_space / in_space.sum()
     least = _FINEST**2 * np.array([len(each) for each in triangles])
     scale = np.sqrt(np.maximum(share, least) / np.maximum(in_layout, 1e-300))
@@ -161,7 +166,7 @@ def boxes(uvs: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return np.minimum.reduceat(uv, starts), np.maximum.reduceat(uv, starts)
 
 
-def _centre(corners):
+def centre(corners: np.ndarray) -> np.ndarray:
     """The centre of area, (2,), of triangles (t, 3, 2), all counted as positive."""
     weight = np.abs(signed_areas(corners))
     if not weight.any():

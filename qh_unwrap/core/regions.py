@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .doubles import find_doubles
-from .islands import Island, across_edges, find_islands, meeting, uv_vertices
+from .islands import Island, find_islands
+from .joints import across_edges, meet, uv_vertices
 from .pieces import around_faces, components
 
 
@@ -60,8 +61,8 @@ class Connected:
         self.set_aside[self.corner_face[doubles.corners[apart]]] = True
         self._single = single = ~doubles.among(len(face_start))[self.corner_face]
         one, start, end, _ = across_edges(corner_vertex, corner_edge, following, nowhere, np.flatnonzero(single))
-        meet = meeting(uv, one, start, end, following)
-        one, start, end = one[meet], start[meet], end[meet]
+        joins = meet(uv, one, start, end, following)
+        one, start, end = one[joins], start[joins], end[joins]
         self.joined = nowhere.copy()
         self.joined[corner_edge[one]] = True
         self.uv_vertex = uv_vertices(one, start, end, following)

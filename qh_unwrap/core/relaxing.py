@@ -178,7 +178,8 @@ def _settled(shape, task, result, settings):
         uv = uv * (-1, 1) if task.mirrored else uv
         uv = in_place(uv, shape.triangles, corners) if says_where(corners) else uv
     was_valid = _is_valid(surface, old)
-    if was_valid and not _gains(surface, old, uv, settings.balance):
+    # Where triangles have an importance, the energy that has fallen is another one.
+    if was_valid and shape.importance is None and not _gains(surface, old, uv, settings.balance):
         uv = old
     if settings.blend < 1:
         uv = _blended(surface, old, uv, settings.blend, was_valid)

@@ -28,6 +28,7 @@ class Shape:
     walls      (w, 2, 2), segments in the frame of `uv` that the outline must not cross (boundary FREE); those that
                cross it already, or each other, do not count
     face       (m,) int, the polygon that each triangle is a part of, where warnings are to speak of polygons
+    importance (m,), positive: how many times as large each triangle shall be in the map as one of importance 1
     """
 
     vertices: np.ndarray
@@ -36,6 +37,7 @@ class Shape:
     pinned: np.ndarray | None = None
     partner: np.ndarray | None = None
     face: np.ndarray | None = None
+    importance: np.ndarray | None = None
     start: np.ndarray | None = None
     crossing: bool = False
     walls: np.ndarray | None = None

@@ -71,6 +71,12 @@ def corners_of(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return corners.T
 
 
+def boxes_of(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The lower and the upper corners, (m, d) each, of the boxes around triangles (m, 3, d)."""
+    a, b, c = corners.swapaxes(0, 1)
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
 def signed_areas(corners: np.ndarray) -> np.ndarray:
     """Signed areas (m,) of plane triangles (m, 3, 2), positive counter-clockwise."""
     (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
@@ -83,10 +89,15 @@ def normals(corners: np.ndarray) -> np.ndarray:
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx]).T
 
 
+def areas_of(corners: np.ndarray) -> np.ndarray:
+    """Areas (m,) of triangles in space (m, 3, 3)."""
+    return 0.5 * np.linalg.norm(normals(corners), axis=1)
+
+
 def areas_in_space(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Areas (m,) of triangles (m, 3) with points (n, 3)."""
     points = np.asfortranarray(points)
-    return by_parts(lambda part: 0.5 * np.linalg.norm(normals(corners_of(points, part.T)), axis=1), triangles.T)
+    return by_parts(lambda part: areas_of(corners_of(points, part.T)), triangles.T)
 
 
 def laid_flat(points: np.ndarray, triangles: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:

@@ -11,9 +11,11 @@ import numpy as np
 from . import memory
 from .air import Triangulator
 from .errors import InternalError, OutOfMemoryError, UnwrapError
+from .importance import corrected, is_uneven
 from .report import Result, Shape, State
 from .session import Unwrapper
 from .settings import Settings
+from .stepping import mapped
 
 _TOGETHER = 2000  # triangles of the largest island that goes together with others
 _AT_ONCE = 60_000  # triangles of islands that go together
@@ -80,6 +82,17 @@ def unwrap_islands(
     """
     settings = settings or Settings()
     settings.check_together()
+    if not any(map(is_uneven, shapes)):
+        return (yield from _unwrapped(shapes, settings, triangulate))
+    results = yield from mapped(lambda share: share / 2, _unwrapped(shapes, settings, triangulate))
+
+    def again(some: Sequence[Shape], its_settings: Settings) -> Generator[float, None, list[Result | UnwrapError]]:
+        return _unwrapped(some, its_settings, triangulate)
+
+    return (yield from mapped(lambda share: (1 + share) / 2, corrected(shapes, results, settings, again)))
+
+
+def _unwrapped(shapes, settings, triangulate):
     found: dict[int, Result | UnwrapError] = {}
     work = [_FIXED + _size(shape) for shape in shapes]
     done, furthest, total = 0.0, 0.0, max(sum(work), 1)

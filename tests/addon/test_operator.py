@@ -376,7 +376,7 @@ def test_operator_has_every_setting():
         assert (found.default, found.name, found.description) == (default, meta["label"], meta["description"])
         if meta["choices"]:
             assert [item.identifier for item in found.enum_items] == [choice.identifier for choice in meta["choices"]]
-        elif type(field.default) is not bool:
+        elif type(field.default) not in (bool, str):
             assert (found.hard_min, found.hard_max) == pytest.approx(meta["range"])
             assert (found.soft_min, found.soft_max) == pytest.approx(meta["soft_range"])
 
@@ -419,6 +419,9 @@ class Layout:
     def panel(self, idname, default_closed=False):
         return self.row(), self.row()
 
+    def prop_search(self, owner, name, _data, _search):
+        self.prop(owner, name)
+
     def prop(self, owner, name):
         assert hasattr(owner, name)
         self.rows.append(name)
@@ -445,10 +448,13 @@ def drawn(panel):
 def test_panel_passes_the_scenes_settings_to_its_button(panel):
     bpy.context.scene.qh_unwrap.iterations = 3
     bpy.context.scene.qh_unwrap.boundary = 'RECTANGLE'
+    bpy.context.scene.qh_unwrap.texel_density = 'GIVEN'
+    bpy.context.scene.qh_unwrap.use_weights = True
     layout = drawn(panel)
     assert sorted(layout.all("rows")) == sorted(field.name for field in _FIELDS)
-    ((idname, button),) = layout.all("buttons")
-    assert idname == "uv.qh_unwrap"
+    buttons = dict(layout.all("buttons"))
+    button = buttons.pop("uv.qh_unwrap")
+    assert list(buttons) == ["uv.qh_check"]
     assert vars(button) == bpy.context.scene.qh_unwrap.as_keywords()
     assert (button.iterations, button.boundary) == (3, 'RECTANGLE')
 

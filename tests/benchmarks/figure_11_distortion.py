@@ -8,23 +8,19 @@ minimisation reduces area distortion further, at the cost of angles; our default
 
 import numpy as np
 
-from qh_unwrap.core import distortion
+from qh_unwrap.core import distortion, unwrap
+from qh_unwrap.core.curves import FIGURE_11, curves
 
-from .common import Verdicts, final_map, given_meshes, output_folder, table
+from .common import Verdicts, given_meshes, output_folder, table
 from .drawing import BLUE, GREEN, GREY, RED, plain_ticks, plt, save
 
-METHODS = {
-    "discrete conformal": (RED, {"initial": "HARMONIC", "iterations": 0}),
-    "stretch minimisation": (GREEN, {"weights": "STRETCH", "iterations": 3}),
-    "quasi-harmonic": (BLUE, {"balance": 0.5, "iterations": 5}),
-    "balance 0.25": (GREY, {"balance": 0.25, "iterations": 6, "repair": True}),
-}
+COLOURS = dict(zip(FIGURE_11, (RED, GREEN, BLUE, GREY), strict=True))
 
 
 def main():
     folder = output_folder(__doc__)
     (mesh,) = given_meshes("mannequin-devil.off").values()
-    found = {method: distortion(*mesh, final_map(mesh, **settings)) for method, (_, settings) in METHODS.items()}
+    found = {method: distortion(*mesh, unwrap(*mesh, settings).uv) for method, settings in FIGURE_11.items()}
     rows = []
     for method, d in found.items():
         ratio = np.exp(np.abs(d.triangle_log_area))
@@ -61,10 +57,11 @@ def draw(found, folder):
     axes[0, 0].set_ylabel("larger / smaller stretch")
     axes[1, 0].set_ylabel("relative area, surface / plane")
     for column, (method, d) in enumerate(found.items()):
-        colour = METHODS[method][0]
-        for row, values in zip(axes, (d.triangle_angle, np.exp(-d.triangle_log_area)), strict=True):
+        colour, its = COLOURS[method], curves([d])
+        for row, name in zip(axes, ("angle", "area"), strict=True):
+            values, ascending = getattr(its, name), getattr(its.ascending, name)
             row[column].plot(values, color=colour, linewidth=0.25, rasterized=True)
-            row[count].plot(np.linspace(0, 1, len(values)), np.sort(values), color=colour, label=method)
+            row[count].plot(np.linspace(0, 1, len(values)), ascending, color=colour, label=method)
         axes[0, column].set(title=method, xlim=(0, len(values)), xticks=(0, 10000, 20000))
         axes[1, column].set_xlabel("triangle")
     axes[0, 0].set(yscale="log", ylim=(0.9, 40))

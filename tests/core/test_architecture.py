@@ -11,7 +11,7 @@ import qh_unwrap
 
 _PACKAGE = Path(qh_unwrap.__file__).parent
 # From the ground up
-_FLOORS = ("core", "patching", "addon", "console", "flags", "single", "farm", "cli", "__init__", "__main__")
+_FLOORS = ("core", "patching", "addon", "console", "flags", "asked", "single", "farm", "cli", "__init__", "__main__")
 
 
 def modules():

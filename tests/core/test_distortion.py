@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qh_unwrap.core import distortion, errors
+from qh_unwrap.core.distortion import measure_corners
 
 from . import shapes
 from .test_tensor import seeds
@@ -54,3 +55,50 @@ def test_bad_uvs_are_refused():
         distortion(vertices, triangles, np.zeros((3, 2)))
     with pytest.raises(errors.UVError):
         distortion(vertices, triangles, np.full((len(vertices), 2), np.nan))
+
+
+def test_any_uvs_are_measured_island_by_island():
+    islands = [shapes.random_disk(seed) for seed in range(3)]
+    maps = [vertices[:, :2] * [k + 1, 1] + 0.1 * np.sin(3 * vertices[:, :2]) for k, (vertices, _) in enumerate(islands)]
+    maps[1] *= [-5, 5]  # mirrored, and larger than the others
+    points, uv = (
+        np.concatenate([values[triangles] for values, (_, triangles) in zip(each, islands, strict=True)])
+        for each in ([vertices for vertices, _ in islands], maps)
+    )
+    island = np.repeat(np.arange(3), [len(triangles) for _, triangles in islands])
+    measured, whole, mirrored, *_ = measure_corners(points, uv, island)
+    seen = np.where(mirrored[island, None, None], (-1, 1), 1) * uv
+    assert whole.to_dict() == pytest.approx(measure_corners(points, seen).whole.to_dict(), rel=1e-9)
+    assert mirrored.tolist() == [False, True, False]
+    maps[1] = maps[1] * [-1, 1]
+    for its, (vertices, triangles), of_map in zip(measured, islands, maps, strict=True):
+        expected = distortion(vertices, triangles, of_map)
+        assert its.to_dict() == pytest.approx(expected.to_dict(), rel=1e-9)
+        assert its.triangle_stretch == pytest.approx(expected.triangle_stretch, rel=1e-9)
+        assert its.triangle_log_area == pytest.approx(expected.triangle_log_area, abs=1e-9)
+
+
+def test_any_uvs_are_measured_where_nothing_hangs_together():
+    vertices, triangles = shapes.grid(4, 4)
+    points, uv = vertices[triangles], vertices[triangles][..., :2].copy()
+    uv[7] = uv[7, ::-1]
+    uv[9] = uv[9, 0]
+    points[11] = points[11, 0]
+    (measured,), *_ = measure_corners(points, uv)
+    assert measured.triangle_orientation.tolist().index(-1) == 7 and measured.flips == 1
+    assert measured.triangle_orientation.tolist().index(0) == 9 and measured.collapsed == 1
+    assert np.isfinite(measured.l2_stretch)
+
+
+def test_an_island_without_area_in_space_is_measured_as_nothing():
+    vertices, triangles = shapes.grid(2, 2)
+    (nothing,), *_ = measure_corners(np.zeros((len(triangles), 3, 3)), vertices[triangles][..., :2])
+    assert nothing.flips == nothing.collapsed == nothing.l2_stretch == 0
+
+
+def test_any_uvs_that_are_no_numbers_are_refused():
+    vertices, triangles = shapes.grid(2, 2)
+    with pytest.raises(errors.UVError):
+        measure_corners(vertices[triangles], np.full((len(triangles), 3, 2), np.nan))
+    with pytest.raises(errors.ShapeError):
+        measure_corners(vertices[triangles], np.zeros((3, 3, 2)))

@@ -9,6 +9,7 @@ each step yields.  `gui` opens workspaces and sidebars, moves the pointer, press
 import bpy  # isort: skip  (the wheel knows bmesh only after this)
 import bmesh
 import numpy as np
+from everything_in_file import differences, everything
 
 
 def steps(gui):
@@ -23,6 +24,9 @@ def steps(gui):
     yield from _reports(gui)
     yield from _troubles(gui)
     yield from _seams(gui)
+    yield from _check(gui)
+    yield from _heatmap(gui)
+    yield from _compare(gui)
     yield from _long_work(gui)
 
 
@@ -32,6 +36,7 @@ def _menus(gui):
     gui.shot("1_menu_view_3d.png")
     gui.key("q")
     yield 2
+    yield from _end(gui)
     assert not np.array_equal(_uvs(), before), "the menu entry did nothing"
     gui.shot("2_report.png")
     yield from _redo(gui, "3_redo_panel.png")
@@ -94,6 +99,8 @@ def _sidebars(gui):
     yield 1
     gui.click(*_button(gui, 'IMAGE_EDITOR', _BUTTONS["Unwrap"]))
     yield 2
+    yield from _end(gui)
+    yield 1
     gui.shot("10_packed_by_the_button.png")
     assert not np.array_equal(_uvs(), before), "the button did nothing"
     assert _uvs().min() >= 0 and _uvs().max() <= 1, "not packed: ESC, pressed before, stops Blender's packer"
@@ -157,11 +164,90 @@ def _seams(gui):
     yield 1
     with gui.override('VIEW_3D'):
         bpy.ops.uv.qh_seams('INVOKE_DEFAULT')
-    yield 6
+    yield from _end(gui)
+    yield 1
     with gui.override('IMAGE_EDITOR'):
         bpy.ops.image.view_all(fit_view=True)
     yield 1
     gui.shot("21_seams.png")
+
+
+def _check(gui):
+    """A check says what is wrong with UVs, changes nothing, and leads to the faces in both editors."""
+    _add(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
+    with gui.override('VIEW_3D'):
+        bpy.ops.uv.smart_project(angle_limit=1.2)
+    yield 1
+    before = _uvs()
+    gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Check"]))
+    yield 2
+    yield from _end(gui)
+    gui.shot("22_checked.png")
+    assert np.array_equal(_uvs(), before), "the check changed something"
+    for sync in (True, False):
+        bpy.context.scene.tool_settings.use_uv_select_sync = sync
+        with gui.override('VIEW_3D'):
+            bpy.ops.uv.qh_check_select(kind='WORST')
+        yield 1
+        gui.shot(f"23_worst_faces_sync_{sync}.png".lower())
+        assert 0 < bpy.context.object.data.count_selected_items()[2] < 10, "not the worst faces are selected"
+
+
+def _heatmap(gui):
+    """It shows each quantity, follows the UVs, and leaves everything as it was."""
+    _add(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
+    with gui.override('VIEW_3D'):
+        bpy.ops.uv.unwrap(method='CONFORMAL', margin=0.01)
+    yield 1
+    everything()  # reading some of it makes it
+    before = everything()
+    for _ in ("on", "off", "on"):
+        with gui.override('VIEW_3D'):
+            bpy.ops.uv.qh_heatmap()
+        yield 1
+        assert not differences(before, everything()), differences(before, everything())[:9]
+    for quantity in ('STRETCH', 'ANGLE', 'AREA', 'DENSITY'):
+        bpy.context.scene.qh_heatmap.quantity = quantity
+        yield 1
+        gui.shot(f"24_heatmap_{quantity.lower()}.png")
+    bpy.context.scene.qh_heatmap.property_unset("quantity")
+    with gui.override('VIEW_3D'):
+        bpy.ops.uv.qh_unwrap()
+    yield 2
+    gui.shot("25_heatmap_followed.png")
+    with gui.override('VIEW_3D'):
+        bpy.ops.object.mode_set(mode='OBJECT')
+    yield 1
+    gui.shot("26_heatmap_object_mode.png")
+    with gui.override('VIEW_3D'):
+        bpy.ops.object.mode_set(mode='EDIT')
+        bpy.ops.uv.qh_heatmap()
+    yield 1
+    gui.shot("27_heatmap_off.png")
+
+
+def _compare(gui):
+    """A table of what methods make of copies, and a plot in a window of its own."""
+    before = _uvs()
+    gui.move('VIEW_3D', fx=0.4, fy=0.5)
+    with gui.override('VIEW_3D'):
+        bpy.ops.uv.qh_compare('INVOKE_DEFAULT')
+    yield 2
+    yield from _end(gui)
+    yield 1
+    gui.shot("28_table.png")
+    gui.key("Escape")
+    yield 1
+    with gui.override('VIEW_3D'):
+        bpy.ops.uv.qh_plot('INVOKE_DEFAULT')
+    yield 2
+    yield from _end(gui)
+    yield 1
+    gui.shot("29_plot.png")
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
+        bpy.ops.wm.window_close()
+    yield 1
+    assert np.array_equal(_uvs(), before), "the comparison changed something"
 
 
 def _troubled(calc_uvs):
@@ -276,7 +362,8 @@ def _end(gui):
 
 
 def _is_running(gui):
-    return "UV_OT_qh_unwrap" in [operator.bl_idname for operator in gui.window.modal_operators]
+    running = {operator.bl_idname for operator in gui.window.modal_operators}
+    return bool(running & {"UV_OT_qh_unwrap", "UV_OT_qh_seams", "UV_OT_qh_check", "UV_OT_qh_compare", "UV_OT_qh_plot"})
 
 
 def _sheet(size):
@@ -293,8 +380,14 @@ def _sheet(size):
     return add
 
 
-_BUTTONS = {"Unwrap": 43, "Layout": 161, "Mesh": 289, "Advanced": 314}  # pixels below the top of the sidebar
-_ADVANCED_BELOW_MESH = 468  # the same, where the section Mesh is open
+_BUTTONS = {
+    "Unwrap": 43,
+    "Check": 69,
+    "Layout": 187,
+    "Mesh": 341,
+    "Advanced": 366,
+}  # pixels below the top of the sidebar
+_ADVANCED_BELOW_MESH = 546  # the same, where the section Mesh is open
 
 
 def _add(gui, add, is_seam):
