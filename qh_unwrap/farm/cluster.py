@@ -46,7 +46,7 @@ def unwrapped(assets, address, limits):
 def _connected(address, patience):
     import distributed
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is said once, in our words
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what is lost is said once, in our words
     limit = time.monotonic() + patience
     while True:
         try:
