@@ -84,8 +84,12 @@ class Connected:
         return ~still[self.uv_vertex] & self._single
 
     def spread(self, corners: np.ndarray) -> np.ndarray:
-        """The chosen corners (c,) bool, and all that share a UV vertex with one of them."""
-        return self._at_vertices(corners)[self.uv_vertex]
+        """The chosen corners (c,) bool, and all that share a UV vertex with one of them, or lie on such."""
+        doubles = self._doubles
+        chosen = corners.copy()
+        its = corners[doubles.corners] & ~self.set_aside[self.corner_face[doubles.corners]]
+        chosen[doubles.twins[its]] = True
+        return self._at_vertices(chosen)[self.uv_vertex]
 
     def _at_vertices(self, corners):
         """Which UV vertices have any of the corners (c,) bool, (v,) bool; those of doubled faces do not count."""

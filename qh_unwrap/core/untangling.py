@@ -43,12 +43,13 @@ def untangled(
     for _ in range(_STEPS):
         if not going.any():
             break
-        energy = _Bent(domain, start if before is None else before, size, bent)
-        jacobian = energy.jacobian(uv)
-        value = energy.value(jacobian)
         try:
             with np.errstate(over="ignore", invalid="ignore"):
+                energy = _Bent(domain, start if before is None else before, size, bent)
+                jacobian = energy.jacobian(uv)
+                value = energy.value(jacobian)
                 after, now, moved = descended(domain, energy, uv, jacobian, value, going)
+                stalled = ~moved | ~(value - now >= _STALLED * value)
         except SingularError:
             if len(sound) > 1:  # whose fault it is comes out where each is alone
                 raise
@@ -58,7 +59,7 @@ def untangled(
         uv = after
         sound |= going & ~wrong_pieces(domain.charts, uv)
         since += 1
-        stalled = ~moved | (value - now < _STALLED * value) | (since > _AT_ONCE)
+        stalled |= since > _AT_ONCE
         bent, since = np.where(stalled, bent * _SHARPER, bent), np.where(stalled, 0, since)
         going = ~sound & (bent > _LEAST_BENT)
         yield

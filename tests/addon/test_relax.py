@@ -373,6 +373,22 @@ def test_doubled_faces_with_uvs_of_their_own_stay():
     assert np.array_equal(old[36:], new[36:]) and moved(old, new).any()
 
 
+def test_a_pin_of_a_doubled_face_holds_what_it_lies_on():
+    points = [(x, y, 0.2 * x * y) for y in range(4) for x in range(4)]
+    quads = [(4 * y + x, 4 * y + x + 1, 4 * y + x + 5, 4 * y + x + 4) for y in range(3) for x in range(3)]
+    obj = mesh_object("Card", points, quads + [quads[4][::-1]])
+    vertex = np.array([loop.vertex_index for loop in obj.data.loops])
+    values = np.array(points)[vertex][:, :2] / 3
+    values[vertex == 5] += 0.1
+    obj.data.uv_layers.new(name="UVMap").uv.foreach_set("vector", values.astype(np.float32).ravel())
+    pins = np.zeros(len(vertex), bool)
+    pins[36:] = vertex[36:] == 5
+    obj.data.attributes.new(".pn.UVMap", 'BOOLEAN', 'CORNER').data.foreach_set("value", pins)
+    old = uvs(obj)
+    assert relax() == {'FINISHED'}
+    assert at_vertices(obj, moved(old, uvs(obj))) == {6, 9, 10}
+
+
 def test_no_uv_map_says_so():
     add_grid(uv=False)
     with pytest.raises(RuntimeError, match="has no UV map: unwrap it first"):
