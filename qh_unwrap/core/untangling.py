@@ -8,7 +8,7 @@ arrive after some twenty where descents along gradients are still under way afte
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 
 import numpy as np
 
@@ -36,16 +36,37 @@ def untangled(
     A generator: yields after each step, returns the map and in which pieces (p,) bool nothing is flipped now; others
     are as they were.
     """
-    start, sound = uv, ~wrong_pieces(domain.charts, uv)
     size = map_scale(domain.island, uv)
-    bent = np.ones(len(sound))
+    moved, sound = yield from pressed_open(domain, uv, size, lambda now: ~wrong_pieces(domain.charts, now), 1.0, before)
+    return np.where(sound[domain.vertex_piece, None], moved, uv), sound
+
+
+def pressed_open(
+    domain: Domain,
+    uv: np.ndarray,
+    size: np.ndarray,
+    is_open: Callable[[np.ndarray], np.ndarray],
+    bent: float,
+    before: np.ndarray | None = None,
+) -> Generator[None, None, tuple[np.ndarray, np.ndarray]]:
+    """Descend the energy of the map `uv` (n, 2), less and less bent, until `is_open` says of a piece that it may end.
+
+    size     (p,), the scale of each piece's map
+    is_open  a function of maps (n, 2) that returns for every piece, (p,) bool, whether nothing is flipped
+    bent     how much the energy is bent at first
+    before   as in `untangled`
+
+    A generator: yields after each step, returns the map and what is open, (p,) bool.
+    """
+    start, sound = uv, is_open(uv)
+    bends = np.full(len(sound), bent)
     going, since = ~sound, np.zeros(len(sound), int)
     for _ in range(_STEPS):
         if not going.any():
             break
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                energy = _Bent(domain, start if before is None else before, size, bent)
+                energy = _Bent(domain, start if before is None else before, size, bends)
                 jacobian = energy.jacobian(uv)
                 value = energy.value(jacobian)
                 after, now, moved = descended(domain, energy, uv, jacobian, value, going)
@@ -57,13 +78,13 @@ def untangled(
         if not np.isfinite(after).all():
             break
         uv = after
-        sound |= going & ~wrong_pieces(domain.charts, uv)
+        sound |= going & is_open(uv)
         since += 1
         stalled |= since > _AT_ONCE
-        bent, since = np.where(stalled, bent * _SHARPER, bent), np.where(stalled, 0, since)
-        going = ~sound & (bent > _LEAST_BENT)
+        bends, since = np.where(stalled, bends * _SHARPER, bends), np.where(stalled, 0, since)
+        going = ~sound & (bends > _LEAST_BENT)
         yield
-    return np.where(sound[domain.vertex_piece, None], uv, start), sound
+    return uv, sound
 
 
 class _Bent(Barrier):

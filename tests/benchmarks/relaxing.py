@@ -31,7 +31,7 @@ def main():
     parser.add_argument("--count", type=int, default=50, help="how many meshes (default: 50)")
     parser.add_argument("--largest", type=int, default=60_000, help="leave out meshes of more triangles")
     arguments = parser.parse_args()
-    paths = [path for folder in ("disk", "artist", "charts") for path in paths_in(folder)]
+    paths = [path for folder in ("disk", "artist", "charts", "islands") for path in paths_in(folder)]
     verdicts, rows = Verdicts(), []
     print(f"{'mesh':<28}{'triangles':>10}{'before':>11}{'ours':>9}{'s':>7}{'Minimize':>11}{'s':>7}  held")
     with extension():
