@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Figures in files, and in an Image Editor."""
 
+from functools import partial
 from xml.etree import ElementTree
 
 import bpy
@@ -62,9 +63,23 @@ def _filled(image, figure):
 def show(image, context):
     """Show it in an Image Editor, in a new window if there is none."""
     area = next((area for area in context.screen.areas if area.ui_type == 'IMAGE_EDITOR'), None)
-    if area is None:
-        bpy.ops.wm.window_new()
-        area = max(context.window_manager.windows[-1].screen.areas, key=lambda area: area.width * area.height)
+    if area is not None:
+        _put(image, area)
+        return
+    # Not now: an operator that opens a window while it is modal in another one never ends there.
+    bpy.app.timers.register(partial(_show_in_new_window, image.name, context.window), first_interval=0.01)
+
+
+def _show_in_new_window(name, window):
+    image = bpy.data.images.get(name)
+    if image is not None and window in list(bpy.context.window_manager.windows):
+        with bpy.context.temp_override(window=window):
+            bpy.ops.wm.window_new()
+        area = max(bpy.context.window_manager.windows[-1].screen.areas, key=lambda area: area.width * area.height)
         area.ui_type = 'IMAGE_EDITOR'
+        _put(image, area)
+
+
+def _put(image, area):
     area.spaces.active.image = image
     area.tag_redraw()

@@ -91,6 +91,8 @@ def _sidebars(gui):
     before = _uvs()
     gui.click(*_button(gui, 'IMAGE_EDITOR', _BUTTONS["Unwrap"]))
     yield 2
+    yield from _end(gui)
+    yield 1
     gui.shot("9_no_uvs_selected.png")
     gui.key("Escape")
     with gui.override('IMAGE_EDITOR'):
@@ -116,6 +118,8 @@ def _reports(gui):
     yield 1
     gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Unwrap"]))
     yield 2
+    yield from _end(gui)
+    yield 1
     gui.shot("11_error.png")
     gui.move('VIEW_3D', fx=0.2, fy=0.9)
     yield 2
@@ -139,6 +143,8 @@ def _troubles(gui):
         yield 1
     gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Unwrap"]))
     yield 2
+    yield from _end(gui)
+    yield 1
     gui.shot("17_troubles.png")
     gui.move('VIEW_3D', fx=0.2, fy=0.9)
     with gui.override('VIEW_3D'):
@@ -154,6 +160,8 @@ def _seams(gui):
     _add(gui, bpy.ops.mesh.primitive_monkey_add, lambda one, other: False)
     gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Unwrap"]))
     yield 2
+    yield from _end(gui)
+    yield 1
     gui.shot("19_without_seams.png")
     gui.move('VIEW_3D', fx=0.2, fy=0.5)
     yield 1
