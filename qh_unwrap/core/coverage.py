@@ -20,7 +20,6 @@ _TRIES = 0.5  # comparisons by chance for each triangle that meets a box, which 
 _OF_ALL = 0.05  # of all pairs in boxes that cannot be halved, those that are compared by chance first
 _CHEAP = 5000  # comparisons that cost no less than fewer
 _SHRINKING = 0.85  # of its pairs that halving a box must leave at most, or else it is not worth it
-_EVENLY = 0.65  # the same where a box is halved evenly, which leaves about half of them unless triangles reach far
 _ROUNDED = 4 * float(np.finfo(np.float32).eps)  # of a coordinate, by which moving an island may round it
 _SURE = 1e-15  # of the terms of a sum of products, what rounding may take of it
 
@@ -56,13 +55,12 @@ def covered(
         few = work <= np.maximum(_FEW, _UNKNOWN * boxes.counts())
         search.compare(boxes.chosen(few))
         many = boxes.chosen(~few)
-        halves, stuck = search.halved(many)
-        crowded = many.chosen(stuck)
-        others, stuck = search.halved(crowded, evenly=True)
-        rest = crowded.chosen(stuck)
+        halves = many.halved(search.low, search.high)
+        stuck = search.work(halves).reshape(-1, 2).sum(axis=1) > _SHRINKING * work[~few]
+        rest = many.chosen(stuck)
         search.compare_by_chance(rest, _OF_ALL * search.work(rest).sum())
         search.compare(rest)
-        boxes = halves.joined(others)
+        boxes = halves.chosen(np.repeat(~stuck, 2))
     return Covered(search.found, search.pairs())
 
 
@@ -89,28 +87,13 @@ class _Boxes(NamedTuple):
         number = np.cumsum(mask) - 1
         return _Boxes(self.low[mask], self.high[mask], number[self.box[its]], self.triangle[its])
 
-    def joined(self, others: _Boxes) -> _Boxes:
-        """These boxes and others."""
-        low, high = np.concatenate([self.low, others.low]), np.concatenate([self.high, others.high])
-        box = np.concatenate([self.box, others.box + len(self.low)])
-        return _Boxes(low, high, box, np.concatenate([self.triangle, others.triangle]))
-
-    def halved(self, low: np.ndarray, high: np.ndarray, evenly: bool = False) -> _Boxes:
-        """Both halves of each box, one after the other; triangles reach from `low` to `high`, (m, 2) each.
-
-        A box is cut in its middle, or `evenly`, so that as many triangles have their centres in the one half as in the
-        other: wherever in the box they crowd.
-        """
+    def halved(self, low: np.ndarray, high: np.ndarray) -> _Boxes:
+        """Both halves of each box, one after the other; triangles reach from `low` to `high`, (m, 2) each."""
         new_low, new_high = np.repeat(self.low, 2, axis=0), np.repeat(self.high, 2, axis=0)
         rows, axis = np.arange(len(self.low)), np.argmax(self.high - self.low, axis=1)
-        its_axis = axis[self.box]
         middle = (self.low + self.high)[rows, axis] / 2
-        if evenly:
-            centre = (low + high)[self.triangle, its_axis] / 2
-            centre = np.clip(centre, self.low[self.box, its_axis], self.high[self.box, its_axis])
-            middle = centre[np.lexsort((centre, self.box))[self.starts + self.counts() // 2]]
         new_high[2 * rows, axis] = new_low[2 * rows + 1, axis] = middle
-        its_middle = middle[self.box]
+        its_axis, its_middle = axis[self.box], middle[self.box]
         in_first = low[self.triangle, its_axis] < its_middle
         in_second = high[self.triangle, its_axis] > its_middle
         in_first |= ~in_second
@@ -156,12 +139,6 @@ class _Search:
             several[some] = np.minimum.reduceat(group, first) < np.maximum.reduceat(group, first)
             left &= several
         return boxes.chosen(left)
-
-    def halved(self, boxes, evenly=False):
-        """The halves of the boxes that are worth halving, and which are not, (b,) bool."""
-        halves = boxes.halved(self.low, self.high, evenly)
-        stuck = self.work(halves).reshape(-1, 2).sum(axis=1) > (_EVENLY if evenly else _SHRINKING) * self.work(boxes)
-        return halves.chosen(np.repeat(~stuck, 2)), stuck
 
     def work(self, boxes):
         """How many pairs of triangles are left to compare in each box, (b,)."""

@@ -70,11 +70,3 @@ def test_a_tangle_takes_no_longer(way):
     start = process_time()
     assert found(corners).triangles.mean() > 0.4
     assert process_time() - start < 10
-
-
-def test_a_crowd_takes_no_longer():
-    vertices, triangles = shapes.grid(100, 100)
-    crowded = np.exp(12 * vertices[:, :2])[triangles]  # half of the triangles lie in a 400th of the width
-    start = process_time()
-    assert not found(crowded).triangles.any()
-    assert process_time() - start < 10
