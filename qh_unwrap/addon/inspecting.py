@@ -145,6 +145,8 @@ def _tell_of_overlaps(outcomes, found):
         others.setdefault(one, []).append(other)
         others.setdefault(other, []).append(one)
     labels = [outcome.label for outcome in outcomes] if others else []
+    for k in np.flatnonzero(found.grazes).tolist():
+        outcomes[k].notes += ("it touches another island, and by rounding alone lies on it",)
     size = np.bincount(found.stack, minlength=len(outcomes))[found.stack]
     for k in np.flatnonzero(size > 1).tolist():
         outcomes[k].stacked = int(size[k]) - 1

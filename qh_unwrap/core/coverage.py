@@ -14,11 +14,13 @@ from .pieces import starts_of_numbers
 from .triangles import boxes_of
 
 _FEW = 200  # pairs of triangles in a box that are compared without halving it
+_UNKNOWN = 4  # triangles in a box that are not known to be covered, which are compared with all others there
 _FRUITFUL = 0.05  # of the triangles that are looked at by chance, those that must turn out covered for another look
 _TRIES = 0.5  # comparisons by chance for each triangle that meets a box, which always pay
+_OF_ALL = 0.05  # of all pairs in boxes that cannot be halved, those that are compared by chance first
 _CHEAP = 5000  # comparisons that cost no less than fewer
 _SHRINKING = 0.85  # of its pairs that halving a box must leave at most, or else it is not worth it
-_EVENLY = 0.65  # the same where a box is halved evenly, which leaves about half of them unless triangles reach far
+_ROUNDED = 4 * float(np.finfo(np.float32).eps)  # of a coordinate, by which moving an island may round it
 _SURE = 1e-15  # of the terms of a sum of products, what rounding may take of it
 
 
@@ -29,32 +31,36 @@ class Covered(NamedTuple):
     pairs: np.ndarray  # (k, 2) pairs of groups that share some area, the smaller first; at least one of each that does
 
 
-def covered(corners: np.ndarray, sheet: np.ndarray, group: np.ndarray | None = None) -> Generator[float, None, Covered]:
+def covered(
+    corners: np.ndarray, sheet: np.ndarray, group: np.ndarray | None = None, rounding: bool = False
+) -> Generator[float, None, Covered]:
     """The triangles that share some area with another one, exactly, in 32-bit floats.
 
     corners  (m, 3, 2) the UVs of triangles, wound in either direction; those without area cover nothing
     sheet    (m,) numbers from 0: triangles of different sheets are not compared
     group    (m,) numbers from 0: triangles of one group are not compared; by default all are
+    rounding whether triangles that lie in each other no deeper than rounding may take them count as apart
 
     A generator that yields the share that is done, from 0 to 1.
     """
     # Where much lies on each other, most of it is found by comparing triangles of one place by chance.  What is left
     # is compared with everything near: boxes are halved until only few triangles meet them.
-    search = _Search(corners, group)
+    search = _Search(corners, group, rounding)
     share, boxes = 0.0, search.roots(sheet)
     while len(boxes.triangle):
         yield (share := share + 0.1 * (1 - share))
         search.compare_by_chance(boxes)
         boxes = search.open(boxes)
         work = search.work(boxes)
-        few = work <= _FEW
+        few = work <= np.maximum(_FEW, _UNKNOWN * boxes.counts())
         search.compare(boxes.chosen(few))
         many = boxes.chosen(~few)
-        halves, stuck = search.halved(many)
-        crowded = many.chosen(stuck)
-        others, stuck = search.halved(crowded, evenly=True)
-        search.compare(crowded.chosen(stuck))
-        boxes = halves.joined(others)
+        halves = many.halved(search.low, search.high)
+        stuck = search.work(halves).reshape(-1, 2).sum(axis=1) > _SHRINKING * work[~few]
+        rest = many.chosen(stuck)
+        search.compare_by_chance(rest, _OF_ALL * search.work(rest).sum())
+        search.compare(rest)
+        boxes = halves.chosen(np.repeat(~stuck, 2))
     return Covered(search.found, search.pairs())
 
 
@@ -81,28 +87,13 @@ class _Boxes(NamedTuple):
         number = np.cumsum(mask) - 1
         return _Boxes(self.low[mask], self.high[mask], number[self.box[its]], self.triangle[its])
 
-    def joined(self, others: _Boxes) -> _Boxes:
-        """These boxes and others."""
-        low, high = np.concatenate([self.low, others.low]), np.concatenate([self.high, others.high])
-        box = np.concatenate([self.box, others.box + len(self.low)])
-        return _Boxes(low, high, box, np.concatenate([self.triangle, others.triangle]))
-
-    def halved(self, low: np.ndarray, high: np.ndarray, evenly: bool = False) -> _Boxes:
-        """Both halves of each box, one after the other; triangles reach from `low` to `high`, (m, 2) each.
-
-        A box is cut in its middle, or `evenly`, so that as many triangles have their centres in the one half as in the
-        other: wherever in the box they crowd.
-        """
+    def halved(self, low: np.ndarray, high: np.ndarray) -> _Boxes:
+        """Both halves of each box, one after the other; triangles reach from `low` to `high`, (m, 2) each."""
         new_low, new_high = np.repeat(self.low, 2, axis=0), np.repeat(self.high, 2, axis=0)
         rows, axis = np.arange(len(self.low)), np.argmax(self.high - self.low, axis=1)
-        its_axis = axis[self.box]
         middle = (self.low + self.high)[rows, axis] / 2
-        if evenly:
-            centre = (low + high)[self.triangle, its_axis] / 2
-            centre = np.clip(centre, self.low[self.box, its_axis], self.high[self.box, its_axis])
-            middle = centre[np.lexsort((centre, self.box))[self.starts + self.counts() // 2]]
         new_high[2 * rows, axis] = new_low[2 * rows + 1, axis] = middle
-        its_middle = middle[self.box]
+        its_axis, its_middle = axis[self.box], middle[self.box]
         in_first = low[self.triangle, its_axis] < its_middle
         in_second = high[self.triangle, its_axis] > its_middle
         in_first |= ~in_second
@@ -114,13 +105,15 @@ class _Boxes(NamedTuple):
 
 
 class _Search:
-    def __init__(self, corners, group):
+    def __init__(self, corners, group, rounding):
         stored = as_stored(corners)
         way = turn(*stored.swapaxes(0, 1)) if len(stored) else np.zeros(0, dtype=np.int8)
         self.corners = np.where((way < 0)[:, None, None], stored[:, ::-1], stored)
         self.group = group
         self.low, self.high = boxes_of(stored)
         self.found = np.zeros(len(stored), dtype=bool)
+        # How deep triangles may lie in others and count as apart, None for not at all
+        self._slack = _ROUNDED * np.maximum(np.abs(self.low), np.abs(self.high)).max(axis=1) if rounding else None
         self._solid = np.flatnonzero(way)
         self._random = np.random.default_rng(0)
         self._keys = [np.zeros(0, dtype=np.int64)]
@@ -147,19 +140,13 @@ class _Search:
             left &= several
         return boxes.chosen(left)
 
-    def halved(self, boxes, evenly=False):
-        """The halves of the boxes that are worth halving, and which are not, (b,) bool."""
-        halves = boxes.halved(self.low, self.high, evenly)
-        stuck = self.work(halves).reshape(-1, 2).sum(axis=1) > (_EVENLY if evenly else _SHRINKING) * self.work(boxes)
-        return halves.chosen(np.repeat(~stuck, 2)), stuck
-
     def work(self, boxes):
         """How many pairs of triangles are left to compare in each box, (b,)."""
         count = boxes.counts()
         return np.where(count > 1, count, 0) * boxes.counts(~self.found[boxes.triangle])
 
-    def compare_by_chance(self, boxes):
-        """Compare each triangle with any other one in its box, again and again while it pays."""
+    def compare_by_chance(self, boxes, most=0.0):
+        """Compare each triangle with any other one in its box, again and again while it pays, or so many times."""
         count, starts = boxes.counts(), boxes.starts
         if not (count > 1).any():
             return
@@ -172,7 +159,7 @@ class _Search:
             other = starts[boxes.box[unknown]] + (place[unknown] + step) % its
             found = self._compare_pairs(boxes.triangle[unknown], boxes.triangle[other])
             tries += max(len(unknown), _CHEAP)
-            if found <= _FRUITFUL * len(unknown) and tries >= len(boxes.box) * _TRIES:
+            if found <= _FRUITFUL * len(unknown) and tries >= max(len(boxes.box) * _TRIES, most):
                 return
 
     def compare(self, boxes):
@@ -197,7 +184,8 @@ class _Search:
         one, other = one[chosen], other[chosen]
         if not len(one):
             return 0
-        shared = share_area(self.corners[one], self.corners[other])
+        slack = None if self._slack is None else np.maximum(self._slack[one], self._slack[other])
+        shared = share_area(self.corners[one], self.corners[other], slack)
         one, other = one[shared], other[shared]
         self.found[one] = self.found[other] = True
         if self.group is not None:
@@ -212,16 +200,19 @@ class _Search:
         return np.column_stack(np.divmod(keys, count))
 
 
-def share_area(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def share_area(one: np.ndarray, other: np.ndarray, slack: np.ndarray | None = None) -> np.ndarray:
     """Which pairs of triangles, (k, 3, 2) each and wound counter-clockwise, share some area, (k,) bool: exactly.
 
-    Two share none if and only if a side of one has all of the other on its right or on its line.
+    Two share none if and only if a side of one has all of the other on its right or on its line.  With `slack` (k,),
+    that may lie as far on the left as that.
     """
     left = np.arange(len(one))  # which pairs no side has parted yet
     for first, second in ((one, other), (other, one)):
         for side in range(3):
             its, points = first[left], second[left]
-            left = left[~_on_the_right(its[:, side], its[:, (side + 1) % 3], points)]
+            ends = its[:, side], its[:, (side + 1) % 3]
+            parted = _on_the_right(*ends, points) if slack is None else _nearly_right(*ends, points, slack[left])
+            left = left[~parted]
     shared = np.zeros(len(one), dtype=bool)
     shared[left] = True
     return shared
@@ -229,12 +220,23 @@ def share_area(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def _on_the_right(start, end, points):
     """Which sides, from `start` to `end` (k, 2), have none of the points (k, 3, 2) on their left, (k,) bool."""
-    along = end - start
-    to = points - start[:, None]
-    first, second = along[:, :1] * to[..., 1], along[:, 1:] * to[..., 0]
+    first, second = _products(start, end, points)
     apart, doubt = first - second, _SURE * (np.abs(first) + np.abs(second))
     right = (apart <= doubt).all(axis=1)  # for all that rounding tells
     unsure = np.flatnonzero(right & (np.abs(apart) <= doubt).any(axis=1))
     for point in points[unsure].swapaxes(0, 1):
         right[unsure] &= turn(start[unsure], end[unsure], point) <= 0
     return right
+
+
+def _nearly_right(start, end, points, slack):
+    """The same where points may lie as far on the left as the slack (k,)."""
+    first, second = _products(start, end, points)
+    return (first - second <= (slack * np.linalg.norm(end - start, axis=1))[:, None]).all(axis=1)
+
+
+def _products(start, end, points):
+    """The two products whose difference tells on which side of a line points are, (k, 3) each."""
+    along = end - start
+    to = points - start[:, None]
+    return along[:, :1] * to[..., 1], along[:, 1:] * to[..., 0]

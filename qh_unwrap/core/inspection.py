@@ -32,6 +32,8 @@ class Inspection:
     """(k,) bool, the islands of which some triangles lie on each other."""
     pairs: np.ndarray
     """(p, 2), pairs of islands that lie on each other, of each stack the first; each that does is in one of them."""
+    grazes: np.ndarray
+    """(k,) bool, the islands that lie on others no deeper than rounding may have taken them: no fault."""
     covered: np.ndarray
     """(t,) bool, the triangles that lie on another one, of any island."""
     stack: np.ndarray
@@ -70,9 +72,14 @@ def inspect(
     within = yield from mapped(lambda share: 0.4 + 0.3 * share, covered(in_map[doubtful], islands.island[doubtful]))
     stack = _stacks(islands, own_uv, sheet, face_start)
     steps = covered(in_map, sheet[islands.island], stack[islands.island])
-    between = yield from mapped(lambda share: 0.7 + 0.3 * share, steps)
+    touching = yield from mapped(lambda share: 0.7 + 0.2 * share, steps)
+    its = np.flatnonzero(touching.triangles)
+    steps = covered(in_map[its], sheet[islands.island[its]], stack[islands.island[its]], rounding=True)
+    between = yield from mapped(lambda share: 0.9 + 0.1 * share, steps)
 
-    found = between.triangles
+    found = np.zeros(len(islands.island), dtype=bool)
+    found[its[between.triangles]] = True
+    grazes = np.isin(stack, touching.pairs) & ~np.isin(stack, between.pairs)
     found[doubtful] |= within.triangles
     overlaps_itself = np.zeros(islands.count, dtype=bool)
     overlaps_itself[islands.island[doubtful[within.triangles]]] = True
@@ -81,6 +88,7 @@ def inspect(
         certified=fine & ~overlaps_itself,
         overlaps_itself=overlaps_itself,
         pairs=between.pairs,
+        grazes=grazes,
         covered=found,
         stack=stack,
     )

@@ -131,6 +131,16 @@ def test_islands_on_each_other_are_found_but_for_stacks_and_other_images():
     assert not len(mesh.inspected(sheet=[0, 0, 1, 0, 0, 0]).pairs)
 
 
+def test_islands_that_touch_but_for_rounding_are_told_apart():
+    mesh = quads(3, 1)
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) / 3
+    for shift, pairs, grazes in ((0, 0, 0), (-1e-7, 0, 2), (-1e-5, 1, 0)):
+        mesh.uv = np.concatenate([square, square + 5, square + (1 / 3 + shift, 0)]).astype(np.float32).astype(float)
+        found = mesh.inspected()
+        assert (len(found.pairs), found.grazes.sum()) == (pairs, grazes)
+        assert found.covered.any() == bool(pairs) and found.certified.all()
+
+
 def test_any_mesh_can_be_inspected():
     vertices, triangles = shapes.torus()
     closed = Mesh(vertices, triangles).inspected()  # seen from above: it lies on itself
