@@ -19,7 +19,7 @@ _FRUITFUL = 0.05  # of the triangles that are looked at by chance, those that mu
 _TRIES = 0.5  # comparisons by chance for each triangle that meets a box, which always pay
 _OF_ALL = 0.05  # of all pairs in boxes that cannot be halved, those that are compared by chance first
 _CHEAP = 5000  # comparisons that cost no less than fewer
-_SHRINKING = 0.85  # of its pairs that halving a box must leave at most, or else it is not worth it
+_SPREAD = 1.3  # times as many triangles as meet a box, that meet its halves at most, or else they are not worth it
 _ROUNDED = 4 * float(np.finfo(np.float32).eps)  # of a coordinate, by which moving an island may round it
 _SURE = 1e-15  # of the terms of a sum of products, what rounding may take of it
 
@@ -56,9 +56,9 @@ def covered(
         search.compare(boxes.chosen(few))
         many = boxes.chosen(~few)
         halves = many.halved(search.low, search.high)
-        stuck = search.work(halves).reshape(-1, 2).sum(axis=1) > _SHRINKING * work[~few]
+        stuck = halves.counts().reshape(-1, 2).sum(axis=1) > _SPREAD * many.counts()
         rest = many.chosen(stuck)
-        search.compare_by_chance(rest, _OF_ALL * search.work(rest).sum())
+        search.compare_by_chance(rest, _OF_ALL)
         search.compare(rest)
         boxes = halves.chosen(np.repeat(~stuck, 2))
     return Covered(search.found, search.pairs())
@@ -88,10 +88,16 @@ class _Boxes(NamedTuple):
         return _Boxes(self.low[mask], self.high[mask], number[self.box[its]], self.triangle[its])
 
     def halved(self, low: np.ndarray, high: np.ndarray) -> _Boxes:
-        """Both halves of each box, one after the other; triangles reach from `low` to `high`, (m, 2) each."""
-        new_low, new_high = np.repeat(self.low, 2, axis=0), np.repeat(self.high, 2, axis=0)
-        rows, axis = np.arange(len(self.low)), np.argmax(self.high - self.low, axis=1)
-        middle = (self.low + self.high)[rows, axis] / 2
+        """Both halves of each box, as far as there are triangles in it, one after the other.
+
+        Triangles reach from `low` to `high`, (m, 2) each; none of the boxes is without.
+        """
+        starts = self.starts
+        box_low = np.maximum(self.low, np.minimum.reduceat(low[self.triangle], starts)) if len(starts) else self.low
+        box_high = np.minimum(self.high, np.maximum.reduceat(high[self.triangle], starts)) if len(starts) else self.high
+        new_low, new_high = np.repeat(box_low, 2, axis=0), np.repeat(box_high, 2, axis=0)
+        rows, axis = np.arange(len(box_low)), np.argmax(box_high - box_low, axis=1)
+        middle = (box_low + box_high)[rows, axis] / 2
         new_high[2 * rows, axis] = new_low[2 * rows + 1, axis] = middle
         its_axis, its_middle = axis[self.box], middle[self.box]
         in_first = low[self.triangle, its_axis] < its_middle
@@ -145,8 +151,9 @@ class _Search:
         count = boxes.counts()
         return np.where(count > 1, count, 0) * boxes.counts(~self.found[boxes.triangle])
 
-    def compare_by_chance(self, boxes, most=0.0):
-        """Compare each triangle with any other one in its box, again and again while it pays, or so many times."""
+    def compare_by_chance(self, boxes, share=0.0):
+        """Compare each triangle with any other one in its box, again and again while it pays, or has taken less than
+        that share of what it takes to compare all."""
         count, starts = boxes.counts(), boxes.starts
         if not (count > 1).any():
             return
@@ -159,7 +166,7 @@ class _Search:
             other = starts[boxes.box[unknown]] + (place[unknown] + step) % its
             found = self._compare_pairs(boxes.triangle[unknown], boxes.triangle[other])
             tries += max(len(unknown), _CHEAP)
-            if found <= _FRUITFUL * len(unknown) and tries >= max(len(boxes.box) * _TRIES, most):
+            if found <= _FRUITFUL * len(unknown) and tries >= max(len(boxes.box) * _TRIES, share * its.sum()):
                 return
 
     def compare(self, boxes):

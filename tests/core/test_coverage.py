@@ -70,3 +70,11 @@ def test_a_tangle_takes_no_longer(way):
     start = process_time()
     assert found(corners).triangles.mean() > 0.4
     assert process_time() - start < 10
+
+
+def test_a_crowd_far_from_another_triangle_takes_no_longer():
+    vertices, triangles = shapes.grid(100, 100)
+    corners = np.concatenate([1e-3 * vertices[triangles][..., :2], [[(1, 1), (2, 1), (1, 2)]]])
+    start = process_time()
+    assert not found(corners).triangles.any()
+    assert process_time() - start < 8
