@@ -27,7 +27,8 @@ def last_report():
 
     Each has `object`, `island` (its number), `faces` (how many), `face_indices` and either `error` or `before`,
     `after`, `iterations`, `converged`, `injective`, `overlaps` (some of what it lies on now), `more_overlaps` (how many
-    more were found) and `warnings`, as in the command line's JSON.
+    more were found), `warnings` and `texel_density`, as in the command line's JSON.  After a check of UVs, it has
+    `faults`, `mirrored`, `stacked` and `published` as well, and nothing of the run.
     """
     from .addon import outcome
 

@@ -12,6 +12,7 @@ _PATIENCE = 2.0  # seconds without a bar
 _WIDTH = 30  # of the bar
 _HEAD = ("island", "faces", "stretch", "sym. Dirichlet", "angle", "area", "flips")
 _MEASURES = ("l2_stretch", "symmetric_dirichlet", "angle", "area")
+_PLAIN = {"→": "->", "–": "-", "∞": "inf"}  # where a terminal lacks signs
 
 
 def show(text, *, error=False):
@@ -24,7 +25,13 @@ def show(text, *, error=False):
         try:
             text.encode(encoding)
         except UnicodeEncodeError:
-            text = text.replace("→", "->").replace("–", "-").encode(encoding, "replace").decode(encoding)
+            text = (
+                text.replace("→", "->")
+                .replace("–", "-")
+                .replace("∞", "inf")
+                .encode(encoding, "replace")
+                .decode(encoding)
+            )
         print(text, file=stream, flush=True)
     except (OSError, ValueError):  # a closed pipe, a full disk, a closed stream
         _silence(stream)

@@ -10,6 +10,7 @@ from ..core import Distortion
 from ..core.overlaps import ENOUGH
 from ..core.published import PublishedMeasures
 
+_ENDLESS = 1e30  # what is larger comes of triangles without area
 _NAMES = 5  # that are told; further ones are counted
 
 
@@ -140,7 +141,8 @@ def last_report():
 
     Each has `object`, `island` (its number), `faces` (how many), `face_indices` and either `error` or `before`,
     `after`, `iterations`, `converged`, `injective`, `overlaps` (some of what it lies on now), `more_overlaps` (how many
-    more were found) and `warnings`, as in the command line's JSON.
+    more were found), `warnings` and `texel_density`, as in the command line's JSON.  After a check of UVs, it has
+    `faults`, `mirrored`, `stacked` and `published` as well, and nothing of the run.
     """
     return [outcome.to_dict() | dict(face_indices=outcome.face_indices.tolist()) for outcome in latest]
 
@@ -280,6 +282,8 @@ def count(number, noun):
 
 
 def _shown(value):
+    if value > _ENDLESS:
+        return "∞"
     return f"{value:.3f}" if value < 1e4 else f"{value:.1e}"
 
 

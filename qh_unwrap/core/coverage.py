@@ -43,10 +43,12 @@ def covered(
 
     A generator that yields the share that is done, from 0 to 1.
     """
+    if not len(corners) or (group is not None and not np.ptp(group)):
+        return Covered(np.zeros(len(corners), dtype=bool), np.zeros((0, 2), dtype=np.int64))
     # Where much lies on each other, most of it is found by comparing triangles of one place by chance.  What is left
     # is compared with everything near: boxes are halved until only few triangles meet them.
     search = _Search(corners, group, rounding)
-    share, boxes = 0.0, search.roots(sheet)
+    share, boxes = 0.0, search.open(search.roots(sheet))
     while len(boxes.triangle):
         yield (share := share + 0.1 * (1 - share))
         search.compare_by_chance(boxes)
@@ -113,7 +115,7 @@ class _Boxes(NamedTuple):
 class _Search:
     def __init__(self, corners, group, rounding):
         stored = as_stored(corners)
-        way = turn(*stored.swapaxes(0, 1)) if len(stored) else np.zeros(0, dtype=np.int8)
+        way = turn(*stored.swapaxes(0, 1))
         self.corners = np.where((way < 0)[:, None, None], stored[:, ::-1], stored)
         self.group = group
         self.low, self.high = boxes_of(stored)

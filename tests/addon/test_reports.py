@@ -414,3 +414,10 @@ def test_uvs_that_mean_nothing(value, fault, options, cure):
     with pytest.raises(RuntimeError, match=f"{fault}: {cure}"):
         bpy.ops.uv.qh_unwrap(**options)
     assert bpy.ops.uv.qh_unwrap() == {'FINISHED'}, "otherwise they do not matter"
+
+
+def test_what_is_endless_is_shown_so():
+    outcome = Outcome("Cube", 1, np.arange(6), area=1.0)
+    outcome.after = SimpleNamespace(l2_stretch=3e48, flips=0, collapsed=2)
+    outcome.injective = True
+    assert summary([outcome]) == "1 island, stretch ∞, 2 collapsed"
