@@ -7,9 +7,10 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from .certificate import count_crossings, enclosed_area
-from .chart import Surface, edge_lengths
-from .errors import BorderError, BoundaryError, PinError, UnwrapError, UVError
+from .chart import Surface
+from .errors import BoundaryError, PinError, UnwrapError, UVError
 from .initial import project
+from .loops import edge_lengths
 from .settings import Settings
 
 _BOW = 0.02  # how far a side bulges, relative to its length, where it must not be straight

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import errors
+from .loops import sorted_loops
 from .ordering import FEW, Dissection, banded
 from .topology import HalfEdges, Topology, checked_arrays, edge_keys
 from .triangles import areas_in_space, corner_angles, corners_of, hat_gradients, laid_flat, signed_areas
@@ -161,7 +162,7 @@ class Surface(Chart):
         self.vertex_piece = topology.vertex_piece
         self.vertex_starts, self.triangle_starts = topology.vertex_starts, topology.triangle_starts
         self.on_boundary = topology.on_boundary
-        self.loops, self.loop_piece = _sorted_loops(vertices, topology)
+        self.loops, self.loop_piece = sorted_loops(vertices, topology)
         p = topology.piece_count
         size = np.sqrt(p / len(triangles))  # every piece has the area 1
         rest, degenerate = laid_flat(vertices, triangles, size)
@@ -370,38 +371,3 @@ def _scales(importance, area, starts, piece):
     """What to multiply the shapes of triangles with so that their areas are as the importance says, and add up to 1."""
     total = np.add.reduceat(area * importance, starts) / np.add.reduceat(area, starts)
     return np.sqrt(importance / total[piece])
-
-
-def _sorted_loops(vertices, topology):
-    """The outline of every piece, by pieces, then the holes, the widest first; and the piece of each.
-
-    The outline is the loop that reaches farthest from its middle: a ragged hole may well be longer.  Of several that
-    reach as far, it is the lowest, whatever the vertices' numbers are.
-    """
-    loops, piece = topology.loops, topology.loop_piece
-    if len(loops) == topology.piece_count:  # one for each piece
-        order = np.argsort(piece)
-        return [loops[k] for k in order], piece[order]
-    rank = [_rank(vertices[loop]) for loop in loops]
-    order = np.array(sorted(range(len(loops)), key=lambda k: (piece[k], *rank[k], loops[k][0])))
-    is_outline = np.diff(piece[order], prepend=-1) > 0
-    order = np.concatenate([order[is_outline], order[~is_outline]])
-    return [loops[k] for k in order], piece[order]
-
-
-def _rank(points):
-    """Numbers by which loops with these points (n, 3) are sorted: how far they reach, then where their middle is."""
-    middle = points.mean(axis=0)
-    width = np.linalg.norm(points - middle, axis=1).max()
-    # Rounded, so that rounding errors do not tell equal ones apart
-    return -round(float(width), 9), *np.round(middle[::-1], 6).tolist()
-
-
-def edge_lengths(points: np.ndarray) -> np.ndarray:
-    """Lengths of the sides of a closed polygon (n, d); side i runs from point i to i + 1."""
-    return np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
-
-
-def perimeter(points: np.ndarray) -> float:
-    """Length of the closed polygon (n, d)."""
-    return float(edge_lengths(points).sum())

@@ -5,7 +5,7 @@ from scipy.spatial import ConvexHull
 
 from qh_unwrap.core import Settings, Surface, errors
 from qh_unwrap.core.boundary import held_vertices
-from qh_unwrap.core.chart import edge_lengths
+from qh_unwrap.core.loops import edge_lengths
 
 from . import shapes
 

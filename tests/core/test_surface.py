@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core import Surface, errors
-from qh_unwrap.core.chart import perimeter
+from qh_unwrap.core.loops import perimeter
 from qh_unwrap.core.triangles import signed_areas
 
 from . import shapes
