@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from .certificate import count_crossings, enclosed_area
 from .chart import Surface
-from .errors import BoundaryError, PinError, UnwrapError, UVError
+from .errors import BorderError, BoundaryError, PinError, UnwrapError, UVError
 from .initial import project
 from .loops import edge_lengths
 from .settings import Settings
