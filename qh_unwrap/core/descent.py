@@ -2,8 +2,13 @@
 """From a good map to the one of least distortion: projected Newton steps on an energy that no triangle can flip in.
 
 Air takes part, with the shape it has before a step as its rest shape (Jiang, Schaefer, Panozzo 2017), so that the
-outline cannot cross itself.
+outline cannot cross itself.  It has its part in Newton's equations, but none in the energy that tells how long a step
+may be: it will be at rest where the step leads.
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -13,57 +18,111 @@ from .energy import Barrier
 _LONGEST = 0.9  # of the step at which a triangle collapses
 _ARMIJO = 1e-4  # of the decrease that the slope promises, the least that is taken
 _HALVINGS = 20  # of the step, at most
+_PROMISING = 0.6  # of what the slope promises: a decrease by more is worth a longer step
+_LONGER = 1.5  # times as long
+_LENGTHENINGS = 4  # of the step, at most
 _NEGLIGIBLE = 1e-3  # a decrease smaller than this, relative to the energy, is not worth another step,
 _LITTLE = 1e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
 _INVISIBLE = 1e-6  # a decrease of the energy that nobody could see
 _SPRING = 1e-9  # that holds every vertex in its place, relative to what acts on it
-_RESIDUAL = 0.03  # of Newton's equations, relative to the gradient
+_RESIDUAL = 0.03  # of Newton's equations, relative to the gradient,
+_SHARP = 0.002  # and after a step that was cut short, by a triangle that would have collapsed
 
 
-def newton_step(
-    domain: Domain, uv: np.ndarray, balance: float, size: np.ndarray, going: np.ndarray, patience: float = 1.0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """One step down the energy of the map `uv` (n, 2) in the pieces that are `going` (p,); the others stay.
+class Descent:
+    """Steps down the energy of maps, in every piece of a domain on its own way.
 
-    `size` (p,) is the scale of each piece's map that the energy aims at.  Returns the map before, maybe with new air,
-    the map after, and for which pieces (p,) no further step would pay; with more `patience`, smaller gains do.  Pieces
-    with flips stay and are done.
+    Parameters
+    ----------
+    balance : as in `Settings`
+    size : (p,), the scale of each piece's map that the energy aims at
+    patience : how much smaller gains than usual are worth a step
     """
-    uv = domain.renewed(uv)
-    energy = Barrier(domain, uv, balance, size)
-    before = energy.jacobian(uv)
-    start = energy.value(before)
-    sound = np.isfinite(start)
-    if not (sound & going).any():
-        return uv, uv, np.ones(len(start), bool)
-    if not sound.all():
-        # Equations with flipped triangles are no equations: leave these pieces out.
+
+    def __init__(self, balance: float, size: np.ndarray, patience: float = 1.0):
+        self._balance, self._size, self._patience = balance, size, patience
+        self._residual = np.full(len(size), _RESIDUAL)
+
+    def of(self, pieces: np.ndarray) -> Descent:
+        """The same of the chosen pieces (p,) bool alone."""
+        part = Descent(self._balance, self._size[pieces], self._patience)
+        part._residual = self._residual[pieces]
+        return part
+
+    def step(self, domain: Domain, uv: np.ndarray, going: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """One step from the map `uv` (n, 2) in the pieces that are `going` (p,); the others stay.
+
+        Returns the map before, maybe with new air, the map after, and for which pieces (p,) no further step would pay.
+        Pieces with flips stay and are done.
+        """
+        uv = domain.renewed(uv)
+        energy = Barrier(domain, uv, self._balance, self._size)
+        before = energy.jacobian(uv)
+        start = energy.value(before)
+        sound = np.isfinite(start)
+        if not (sound & going).any():
+            return uv, uv, np.ones(len(start), bool)
+        if not sound.all():
+            return uv, *self._step_of_some(domain, uv, going, sound)
+        gradient, direction = _newton_direction(domain, energy, before, self._residual)
+        change = energy.jacobian(direction)
+        piece = domain.vertex_piece
+        slope = np.bincount(piece, (gradient * direction).sum(axis=1), len(start))
+        limit = np.where(going, _LONGEST * energy.longest_step(before, change), 0.0)
+        length, value = _search(
+            lambda length: energy.value(before + domain.triangles.at(length) * change), start, slope, limit
+        )
+        self._residual = np.where(limit < 1, _SHARP, _RESIDUAL)
+        after = uv + (length[0] if len(length) == 1 else length[piece, None]) * direction
+        worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
+        return uv, after, (length == 0) | (start - value < worth / self._patience)
+
+    def _step_of_some(self, domain, uv, going, sound):
+        """The map after a step of the `sound` pieces alone, and which are done: equations of flipped triangles are no
+        equations."""
         part, its_uv = domain.of(sound, uv)
-        _, its_uv, its_done = newton_step(part, its_uv, balance, size[sound], going[sound], patience)
-        done = np.ones(len(start), bool)
+        descent = self.of(sound)
+        _, its_uv, its_done = descent.step(part, its_uv, going[sound])
+        self._residual[sound] = descent._residual
+        done = np.ones(len(sound), bool)
         done[sound] = its_done
         after = uv.copy()
         after[sound[domain.vertex_piece]] = its_uv
-        return uv, after, done
-    gradient, direction = _newton_direction(domain, energy, before)
-    change = energy.jacobian(direction)
-    length = np.where(going, np.minimum(1.0, _LONGEST * energy.longest_step(before, change)), 0.0)
-    piece = domain.vertex_piece
-    slope = np.bincount(piece, (gradient * direction).sum(axis=1), len(start))
+        return after, done
+
+
+def _search(
+    energy_at: Callable[[np.ndarray], np.ndarray], start: np.ndarray, slope: np.ndarray, limit: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The length of every piece's step, (p,), not above its `limit`, and the energy there, which is `start` before it.
+
+    Newton's own length is 1.  It is halved until the energy falls.  Where that falls by more than the `slope` promises,
+    as it does far from the end, the step becomes longer as long as that pays.
+    """
+    length = np.minimum(1.0, limit)
+    value = energy_at(length)
     for _ in range(_HALVINGS):
-        value = energy.value(before + domain.triangles.at(length) * change)
         steep = ~(value <= start + _ARMIJO * length * slope)
         if not steep.any():
             break
         length[steep] /= 2
+        value = energy_at(length)
     else:
-        length[steep] = 0
-    after = uv + (length[0] if len(length) == 1 else length[piece, None]) * direction
-    worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
-    return uv, after, (length == 0) | (start - value < worth / patience)
+        steep = ~(value <= start + _ARMIJO * length * slope)
+        length[steep], value[steep] = 0, start[steep]
+    growing = start - value > -_PROMISING * length * slope
+    for _ in range(_LENGTHENINGS):
+        longer = np.where(growing, np.minimum(_LONGER * length, limit), length)
+        growing = longer > length
+        if not growing.any():
+            break
+        its = energy_at(longer)
+        growing &= its < value
+        length, value = np.where(growing, longer, length), np.where(growing, its, value)
+    return length, value
 
 
-def _newton_direction(domain, energy, jacobian):
+def _newton_direction(domain, energy, jacobian, residual):
     """The gradient, zero where held, and the direction of descent, (n, 2) each."""
     n, edges = len(domain.vertex_piece), domain.triangles.edges
     corners, k = energy.corners, len(edges)
@@ -79,4 +138,4 @@ def _newton_direction(domain, energy, jacobian):
     own = [-np.bincount(one, part, n) - np.bincount(other, part, n) for part in beside[:3]]
     # What hangs on the rest by nothing but folded faces without area has no equation of its own: it stays.
     own[0] = np.where(own[0] > 0, own[0] * (1 + _SPRING), 1.0)
-    return gradient, domain.constrained.newton_direction(gradient, beside, own, _RESIDUAL)
+    return gradient, domain.constrained.newton_direction(gradient, beside, own, residual)

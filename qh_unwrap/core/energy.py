@@ -71,7 +71,7 @@ class Barrier:
         everything = domain.triangles
         self.corners, self._single = everything.corners, len(size) == 1
         self._hats, self._weight = np.empty((2, 2, self.corners.shape[1])), np.empty(self.corners.shape[1])
-        solid = [(chart, part) for chart, part in everything if not chart.is_air]
+        solid = self._solid = [(chart, part) for chart, part in everything if not chart.is_air]
         air = [(chart, part) for chart, part in everything if chart.is_air]
         total = sum(chart.sums(chart.barrier) for chart, _ in solid)
         for chart, part in solid:
@@ -102,23 +102,29 @@ class Barrier:
     @property
     def least(self) -> np.ndarray:
         """Its least possible value, where every triangle keeps its shape, (p,)."""
-        return self._domain.triangles.sums(self._weight)
+        return sum(chart.sums(self._weight[its]) for chart, its in self._solid)
 
     def jacobian(self, uv: np.ndarray) -> np.ndarray:
         """The map's derivative in every triangle, (2, 2, m)."""
         return jacobian_of(self.corners, self._hats, uv)
 
     def value(self, jacobian: np.ndarray) -> np.ndarray:
-        """Of each piece, (p,), infinite where a triangle is flipped."""
+        """Of each piece without its air, (p,), infinite where a triangle is flipped, in the air as well."""
         (a, b), (c, d) = jacobian
         det = a * d - b * c
         flipped = ~(det > 0)
-        det = np.where(flipped, 1.0, det)
+        some = flipped.any()
+        if some:
+            det[flipped] = 1
+        total = np.zeros(())
         with np.errstate(over="ignore"):
-            value = self._weight * density(a * a + b * b + c * c + d * d, det, self._balance)
-        if flipped.any():
-            value[flipped & (self._weight > 0)] = np.inf
-        return self._domain.triangles.sums(value)
+            for chart, its in self._solid:
+                squares = a[its] ** 2 + b[its] ** 2 + c[its] ** 2 + d[its] ** 2
+                total = total + chart.sums(self._weight[its] * density(squares, det[its], self._balance))
+        if some:
+            barred = self._domain.triangles.largest(flipped & (self._weight > 0))
+            total = np.where(barred, np.inf, total)
+        return total
 
     def longest_step(self, jacobian: np.ndarray, change: np.ndarray) -> np.ndarray:
         """The smallest positive step of each piece at which a triangle collapses, (p,), or some 1e300."""

@@ -16,7 +16,7 @@ import numpy as np
 from .batch import Batch
 from .certificate import certified_pieces, orientation, wrong_pieces
 from .chart import Surface
-from .descent import newton_step
+from .descent import Descent
 from .domain import Domain
 from .energy import energies, map_scale
 from .errors import UnwrapError
@@ -198,12 +198,12 @@ class Improvement:
         Pieces that are `watched` stop where their outlines come to cross themselves in the first step, as most that do.
         """
         settings = self.settings
-        size = map_scale(group.domain.island, group.island_uv)
+        descent = Descent(settings.balance, map_scale(group.domain.island, group.island_uv), self.patience)
         going = np.ones(len(group.pieces), bool)
         folded = _folded(group)
         for number in range(settings.refine):
             domain = group.domain
-            before, after, done = newton_step(domain, group.uv, settings.balance, size, going, self.patience)
+            before, after, done = descent.step(domain, group.uv, going)
             if after is before:
                 return
             group.uv = before
@@ -225,7 +225,7 @@ class Improvement:
             if not going.any():
                 return
             if group.shares(going) <= _FEW:
-                group, size, folded = group.of(going), size[going], folded[going]
+                group, descent, folded = group.of(going), descent.of(going), folded[going]
                 going = np.ones(len(group.pieces), bool)
 
     def _note(self, group, valid, repaired, change, going):
