@@ -19,7 +19,8 @@ way, of a constrained Delaunay triangulation of exactly these points, or None wh
 _RADIUS = 2.5  # of the circle that ends the air, relative to that of the island
 _CIRCLE = 48  # vertices on the circle
 _COARSEST = 4  # edges of the coarsest air that reach from the middle to the circle
-_FINEST = 64  # edges of the finest air that reach across the island's radius
+_FINEST = 64  # edges of the finest air that reach across the island's radius, at most,
+_COARSER = 2  # times as long as those of the outline
 
 
 class Air(NamedTuple):
@@ -77,7 +78,7 @@ def _graded_points(start, end, centre, radius):
     length = np.linalg.norm(end - start, axis=1)
     reach = _RADIUS * radius
     coarsest = step = reach / _COARSEST
-    finest = np.clip(length.mean(), radius / _FINEST, coarsest)
+    finest = np.clip(_COARSER * length.mean(), radius / _FINEST, coarsest)
     count = np.maximum(1, np.ceil(length / finest)).astype(int)
     side = np.repeat(np.arange(len(start)), count)
     part = (np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count)) / count[side]

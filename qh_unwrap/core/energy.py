@@ -15,7 +15,8 @@ from .domain import Domain
 from .tensor import area_scale, jacobian, jacobian_of
 from .triangles import by_parts, corners_of, hat_gradients, signed_areas
 
-AIR = 0.1  # the air's part of the energy
+AIR = 0.15  # air weighs so many times the geometric mean of the energy and of what it lies above its least value,
+_THIN = 1e-4  # or this where it lies hardly above that
 _SMALLEST = 1e-9  # eigenvalue of the Hessian of a triangle of unit weight
 
 
@@ -57,8 +58,8 @@ class Barrier:
 
     Parameters
     ----------
-    domain : whose charts count; those of air have the shape at rest that they have in `uv`, and together the part `AIR`
-        of the energy
+    domain : whose charts count; those of air have the shape at rest that they have in `uv`, and the less weight the
+        nearer the map is to an isometry, so that air does not hold it back there
     uv : (n, 2), the map that is to be improved
     balance : as in `Settings`
     size : (p,), the scale of each piece's map that the energy aims at
@@ -91,9 +92,10 @@ class Barrier:
         if air:
             value = self.value(self.jacobian(uv))
             value = np.where(np.isfinite(value), value, 1.0)  # else the map is given up anyway
+            weight = AIR * np.sqrt(value * np.maximum(value - self.least, _THIN))
             counts = sum(chart.sums(chart.barrier) for chart, _ in air)
             for chart, part in air:
-                self._weight[part] = chart.barrier * self._at(AIR * value / np.maximum(counts, 1), chart)
+                self._weight[part] = chart.barrier * self._at(weight / np.maximum(counts, 1), chart)
 
     def _at(self, values, chart):
         """The values (p,) of the pieces at a chart's triangles, (m,), or the one that there is."""
