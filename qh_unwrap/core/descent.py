@@ -22,7 +22,7 @@ _PROMISING = 0.6  # of what the slope promises: a decrease by more is worth a lo
 _LONGER = 1.5  # times as long
 _LENGTHENINGS = 4  # of the step, at most
 _NEGLIGIBLE = 1e-3  # a decrease smaller than this, relative to the energy, is not worth another step,
-_LITTLE = 1e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
+_LITTLE = 2e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
 _INVISIBLE = 1e-6  # a decrease of the energy that nobody could see
 _SPRING = 1e-9  # that holds every vertex in its place, relative to what acts on it
 _RESIDUAL = 0.03  # of Newton's equations, relative to the gradient,
@@ -67,7 +67,7 @@ class Descent:
         gradient, direction = _newton_direction(domain, energy, before, self._residual)
         change = energy.jacobian(direction)
         piece = domain.vertex_piece
-        slope = np.bincount(piece, (gradient * direction).sum(axis=1), len(start))
+        slope = np.bincount(piece, np.einsum("nc,nc->n", gradient, direction), len(start))
         limit = np.where(going, _LONGEST * energy.longest_step(before, change), 0.0)
         length, value = _search(
             lambda length: energy.value(before + domain.triangles.at(length) * change), start, slope, limit
