@@ -25,7 +25,7 @@ PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
 PINS_FLIP = "no map without flips was found with these pins: unpin some, or move them"
 _NEAR = 1.2  # the energy of a start from which the refinement alone soon arrives
 _LONG = 1.5  # the squared outline from which on it may well cross itself, relative to that of a disk of the same area
-_IN_AIR = 2000  # triangles of the pieces that are improved together with air around them
+_IN_AIR = 5000  # vertices of the pieces that are improved together with air around them
 _LEADS = 12  # times that pins are moved on, before their island begins anew
 _PATIENCE = 30.0  # with maps that go on, so that they end no higher than those that begin anew
 

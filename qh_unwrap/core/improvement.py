@@ -27,7 +27,7 @@ from .unfolding import unfolded
 _HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement
 ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
 _FOLDED = 0.2  # of a surface's area, that flipped triangles may have for it to be worth unfolding
-_FEW = 0.5  # once only this part of the vertices still moves, the others take part no longer
+_FEW = 0.75  # once only this part of the vertices still moves, the others take part no longer
 
 Steps = Generator[None, None, None]
 

@@ -334,7 +334,7 @@ class Constrained:
             ratio = _ratio
 
             def dot(one, other):
-                return np.bincount(group, (one * other).sum(axis=1), count)
+                return np.bincount(group, np.einsum("nc,nc->n", one, other), count)
 
             def at_unknowns(values):
                 return values[group, None]
