@@ -74,6 +74,7 @@ class Improvement:
     changes : list of lists, for every step of a piece the largest movement of a vertex by the layout's diameter
     valid : (p,) bool, in the latest map nothing is flipped, air included
     converged : (p,) bool, another step would change nothing, or would not pay
+    unfinished : (p,) bool, the refinement came to the limit of its steps
     repaired : (p,) bool, weights had to be changed to turn flipped triangles back
     sure : (p,) bool, the best map is known to be certified where it is put in the end
     warnings : list of tuples
@@ -87,7 +88,7 @@ class Improvement:
         n, p = len(batch.uv), batch.surface.piece_count
         self.start, self.now, self.best = (np.zeros((n, 2)) for _ in range(3))
         self.changes: list[list[float]] = [[] for _ in range(p)]
-        self.valid, self.converged, self.repaired, self.sure = (np.zeros(p, bool) for _ in range(4))
+        self.valid, self.converged, self.unfinished, self.repaired, self.sure = (np.zeros(p, bool) for _ in range(5))
         self.warnings: list[tuple[str, ...]] = [()] * p
         self.faults: dict[int, UnwrapError] = {}
         self.live: Group | None = None
@@ -200,6 +201,7 @@ class Improvement:
         settings = self.settings
         descent = Descent(settings.balance, map_scale(group.domain.island, group.island_uv), self.patience)
         going = np.ones(len(group.pieces), bool)
+        self.unfinished[group.pieces] = False
         folded = _folded(group)
         for number in range(settings.refine):
             domain = group.domain
@@ -227,6 +229,7 @@ class Improvement:
             if group.shares(going) <= _FEW:
                 group, descent, folded = group.of(going), descent.of(going), folded[going]
                 going = np.ones(len(group.pieces), bool)
+        self.unfinished[group.pieces[going]] = True
 
     def _note(self, group, valid, repaired, change, going):
         """Keep what the latest step has brought, for the pieces that are `going` (p',) bool."""

@@ -18,6 +18,8 @@ from .improvement import Steps
 from .report import Report, Result, Shape, State, face_warnings
 from .settings import Settings
 
+_GO_ON = "set Refine higher, or unwrap it again from the current UVs"
+
 
 class Unwrapper:
     """Unwraps shapes, together and step by step.
@@ -171,6 +173,9 @@ class Unwrapper:
                 yield course.faults[k]
                 continue
             warnings = course.warnings[k]
+            if course.unfinished[k]:
+                steps = course.settings.refine
+                warnings += (f"it was still improving after {steps} steps: {_GO_ON}",)
             if flat[k]:
                 its = surface.degenerate[ends[k] : ends[k + 1]]
                 warnings += face_warnings(its, given.face(int(batch.index[k])))

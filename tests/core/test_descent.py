@@ -115,6 +115,15 @@ def test_air_holds_no_step_back():
     assert np.isinf(barrier.value(squeezed)).all()
 
 
+def test_what_was_still_improving_is_told():
+    vertices, triangles = shapes.hemisphere(14, flattening=6)
+    stopped = unwrap(vertices, triangles, Settings(refine=2)).report
+    (warning,) = stopped.warnings
+    assert not stopped.converged and warning.startswith("it was still improving after 2 steps: set Refine higher")
+    ended = unwrap(vertices, triangles).report
+    assert ended.converged and not ended.warnings
+
+
 def test_held_vertices_stay():
     vertices, triangles = shapes.bump(5)
     uv = vertices[:, :2] * [1.5, 1]
