@@ -20,6 +20,7 @@ from .improvement import ISOMETRIC, D, Group, Improvement, Steps
 from .pins import lead
 from .settings import Settings
 from .starts import before_pins, best_start, natural_start, start_within, with_pins
+from .stepping import PART, STEP
 
 PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
 PINS_FLIP = "no map without flips was found with these pins: unpin some, or move them"
@@ -139,7 +140,8 @@ class Course(Improvement):
             new = ~(good | to_lead)
             if new.any():
                 start = start.copy()
-                start[batch.rows(new)], known = best_start(surface if new.all() else surface.of(new), settings)
+                found = yield from best_start(surface if new.all() else surface.of(new), settings)
+                start[batch.rows(new)], known = found
                 certified = np.zeros(p, bool)
                 certified[new] = known
         elif settings.initial != "CURRENT":
@@ -147,6 +149,7 @@ class Course(Improvement):
         if batch.has_pins.any():
             placed = with_pins(surface, start, batch.uv, batch.pinned)
             start, certified = np.where(batch.rows(to_lead)[:, None], start, placed), None
+        yield PART
         self._begin(start)
         yield from self._freely(start, settings.initial == "AUTO" or not settings.iterations, certified)
 
@@ -158,7 +161,7 @@ class Course(Improvement):
         batch, settings = self.batch, self.settings
         surface, p = batch.surface, batch.surface.piece_count
         if not self.refining and not settings.iterations:
-            yield
+            yield STEP
             return
         near = done = np.zeros(p, bool)
         if self.refining:
@@ -169,7 +172,7 @@ class Course(Improvement):
                 near = certified & (value < _NEAR) & ~done & ~(batch.has_pins | batch.has_partners) & directly
         self.converged |= done
         if (done | near).any():
-            yield
+            yield STEP
         if near.any():
             winding = surface.outline_lengths**2 > _LONG * 4 * np.pi
             yield from self.refine(self._group(near, start, loose), watched=bool((winding & near).any()))
@@ -306,7 +309,7 @@ class Course(Improvement):
         if late.any():
             start = self.best.copy()
             if self.settings.initial == "AUTO":
-                start[batch.rows(late)], _ = best_start(batch.surface.of(late), self.settings)
+                start[batch.rows(late)], _ = yield from best_start(batch.surface.of(late), self.settings)
             self._put_pins(start, late)
             yield from self._in_air(late, start)
         if not arrived.any():

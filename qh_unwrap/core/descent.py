@@ -8,12 +8,13 @@ may be: it will be at rest where the step leads.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 
 import numpy as np
 
 from .domain import Domain
 from .energy import Barrier
+from .stepping import PART
 
 _LONGEST = 0.9  # of the step at which a triangle collapses
 _ARMIJO = 1e-4  # of the decrease that the slope promises, the least that is taken
@@ -49,11 +50,13 @@ class Descent:
         part._residual = self._residual[pieces]
         return part
 
-    def step(self, domain: Domain, uv: np.ndarray, going: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def step(
+        self, domain: Domain, uv: np.ndarray, going: np.ndarray
+    ) -> Generator[str, None, tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """One step from the map `uv` (n, 2) in the pieces that are `going` (p,); the others stay.
 
         Returns the map before, maybe with new air, the map after, and for which pieces (p,) no further step would pay.
-        Pieces with flips stay and are done.
+        Pieces with flips stay and are done.  Yields `PART` now and then.
         """
         uv = domain.renewed(uv)
         energy = Barrier(domain, uv, self._balance, self._size)
@@ -63,8 +66,12 @@ class Descent:
         if not (sound & going).any():
             return uv, uv, np.ones(len(start), bool)
         if not sound.all():
-            return uv, *self._step_of_some(domain, uv, going, sound)
-        gradient, direction = _newton_direction(domain, energy, before, self._residual)
+            some = yield from self._step_of_some(domain, uv, going, sound)
+            return uv, *some
+        gradient, beside, own = _newton_equations(domain, energy, before)
+        yield PART
+        direction = domain.constrained.newton_direction(gradient, beside, own, self._residual)
+        yield PART
         change = energy.jacobian(direction)
         piece = domain.vertex_piece
         slope = np.bincount(piece, np.einsum("nc,nc->n", gradient, direction), len(start))
@@ -82,7 +89,7 @@ class Descent:
         equations."""
         part, its_uv = domain.of(sound, uv)
         descent = self.of(sound)
-        _, its_uv, its_done = descent.step(part, its_uv, going[sound])
+        _, its_uv, its_done = yield from descent.step(part, its_uv, going[sound])
         self._residual[sound] = descent._residual
         done = np.ones(len(sound), bool)
         done[sound] = its_done
@@ -122,8 +129,8 @@ def _search(
     return length, value
 
 
-def _newton_direction(domain, energy, jacobian, residual):
-    """The gradient, zero where held, and the direction of descent, (n, 2) each."""
+def _newton_equations(domain, energy, jacobian):
+    """The gradient (n, 2), zero where held, and the Hessian as `Constrained.newton_direction` takes it."""
     n, edges = len(domain.vertex_piece), domain.triangles.edges
     corners, k = energy.corners, len(edges)
     *by_corner, mean, difference, symmetric, anti = energy.derivatives(jacobian)
@@ -138,4 +145,4 @@ def _newton_direction(domain, energy, jacobian, residual):
     own = [-np.bincount(one, part, n) - np.bincount(other, part, n) for part in beside[:3]]
     # What hangs on the rest by nothing but folded faces without area has no equation of its own: it stays.
     own[0] = np.where(own[0] > 0, own[0] * (1 + _SPRING), 1.0)
-    return gradient, domain.constrained.newton_direction(gradient, beside, own, residual)
+    return gradient, beside, own

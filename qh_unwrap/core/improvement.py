@@ -22,6 +22,7 @@ from .energy import energies, map_scale
 from .errors import UnwrapError
 from .quasi_harmonic import Iteration
 from .settings import Settings
+from .stepping import PART, STEP
 from .unfolding import unfolded
 
 _HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement
@@ -29,7 +30,8 @@ ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
 _FOLDED = 0.2  # of a surface's area, that flipped triangles may have for it to be worth unfolding
 _FEW = 0.75  # once only this part of the vertices still moves, the others take part no longer
 
-Steps = Generator[None, None, None]
+# They yield `STEP` after each step, and `PART` where one takes long for large islands.
+Steps = Generator[str, None, None]
 
 
 D = TypeVar("D", bound=Domain)
@@ -128,7 +130,7 @@ class Improvement:
         self._note(group, valid, iteration.repaired, None, going)
         number = 0
         while True:
-            yield
+            yield STEP
             island = group.domain.island
             # Repairs and new air make the energy rise and fall: keep the best valid map from then on.
             uneven = iteration.repaired | self.refining | (settings.boundary == "FREE")
@@ -165,6 +167,7 @@ class Improvement:
                 rest.uv = iteration.of(going, group.uv)
                 rest.domain, group, going = iteration.domain, rest, np.ones(len(rest.pieces), bool)
             number += 1
+            yield PART
             before, after, now_valid = iteration.step(group.uv)
             group.uv = before
             previous = group.island_uv.copy()
@@ -199,13 +202,14 @@ class Improvement:
         Pieces that are `watched` stop where their outlines come to cross themselves in the first step, as most that do.
         """
         settings = self.settings
+        yield PART
         descent = Descent(settings.balance, map_scale(group.domain.island, group.island_uv), self.patience)
         going = np.ones(len(group.pieces), bool)
         self.unfinished[group.pieces] = False
         folded = _folded(group)
         for number in range(settings.refine):
             domain = group.domain
-            before, after, done = descent.step(domain, group.uv, going)
+            before, after, done = yield from descent.step(domain, group.uv, going)
             if after is before:
                 return
             group.uv = before
@@ -223,7 +227,7 @@ class Improvement:
             going &= ~done
             if watched and number == 0 and going.any():
                 going &= certified_pieces(island, group.island_uv)
-            yield
+            yield STEP
             if not going.any():
                 return
             if group.shares(going) <= _FEW:
