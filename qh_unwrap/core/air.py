@@ -149,5 +149,6 @@ def _outside(triangles, sides, n):
 
 def quality(corners: np.ndarray) -> np.ndarray:
     """1 for equilateral triangles (t, 3, 2), 0 for flat, negative for flipped ones."""
-    sides = np.roll(corners, -1, axis=1) - corners
-    return 4 * np.sqrt(3) * signed_areas(corners) / (sides**2).sum(axis=(1, 2))
+    x, y = corners.T
+    sides = ((x[[1, 2, 0]] - x) ** 2 + (y[[1, 2, 0]] - y) ** 2).sum(axis=0)
+    return 4 * np.sqrt(3) * signed_areas(corners) / sides

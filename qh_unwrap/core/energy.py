@@ -17,12 +17,13 @@ from .triangles import by_parts, corners_of, hat_gradients, signed_areas
 
 AIR = 0.15  # air weighs so many times the geometric mean of the energy and of what it lies above its least value,
 _THIN = 1e-4  # or this where it lies hardly above that
+_FOLLOWING = [1, 2, 0]  # corners
 _SMALLEST = 1e-9  # eigenvalue of the Hessian of a triangle of unit weight
 
 
 def exponents(balance: float) -> tuple[float, float]:
     """The powers p and r of the density."""
-    return float(np.clip(4 * balance, 0.05, 1)), min(1.0, 4 / 3 * (1 - balance)) ** 3
+    return min(max(4 * balance, 0.05), 1.0), min(1.0, 4 / 3 * (1 - balance)) ** 3
 
 
 def density(squares: np.ndarray, det: np.ndarray, balance: float) -> np.ndarray:
@@ -189,7 +190,7 @@ def _derivatives(jacobian, hats, weight, balance):
     cos, sin = np.cos(right), np.sin(right)
     x, y = hats[:, 0], hats[:, 1]
     h1, h2 = _with_first(x * cos - y * sin), _with_first(x * sin + y * cos)
-    k1, k2 = np.roll(h1, -1, axis=0), np.roll(h2, -1, axis=0)
+    k1, k2 = h1[_FOLLOWING], h2[_FOLLOWING]
     cos, sin = np.cos(left), np.sin(left)
     along, across = value * g1 * h1, value * g2 * h2
     gradient = cos * along - sin * across, sin * along + cos * across
