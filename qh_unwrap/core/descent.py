@@ -27,7 +27,9 @@ _LITTLE = 2e-2  # nor is one smaller than this, relative to what the energy lies
 _INVISIBLE = 1e-6  # a decrease of the energy that nobody could see
 _SPRING = 1e-9  # that holds every vertex in its place, relative to what acts on it
 _RESIDUAL = 0.03  # of Newton's equations, relative to the gradient,
-_SHARP = 0.002  # and after a step that was cut short, by a triangle that would have collapsed
+_SHARP = 0.002  # and where few triangles rule the gradient, so that the others go where they should not:
+_SHORT = 0.5  # after a step that one that all but collapses has made shorter than this,
+_EXTREME = 20  # or above so many times the least possible energy
 
 
 class Descent:
@@ -43,11 +45,12 @@ class Descent:
     def __init__(self, balance: float, size: np.ndarray, patience: float = 1.0):
         self._balance, self._size, self._patience = balance, size, patience
         self._residual = np.full(len(size), _RESIDUAL)
+        self._little = np.zeros(len(size), bool)  # whether the last step brought little
 
     def of(self, pieces: np.ndarray) -> Descent:
         """The same of the chosen pieces (p,) bool alone."""
         part = Descent(self._balance, self._size[pieces], self._patience)
-        part._residual = self._residual[pieces]
+        part._residual, part._little = self._residual[pieces], self._little[pieces]
         return part
 
     def step(
@@ -79,10 +82,15 @@ class Descent:
         length, value = _search(
             lambda length: energy.value(before + domain.triangles.at(length) * change), start, slope, limit
         )
-        self._residual = np.where(limit < 1, _SHARP, _RESIDUAL)
+        hard = (limit < _SHORT) | (value > _EXTREME * energy.least)
+        self._residual = np.where(hard, _SHARP, _RESIDUAL)
         after = uv + (length[0] if len(length) == 1 else length[piece, None]) * direction
         worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
-        return uv, after, (length == 0) | (start - value < worth / self._patience)
+        little = start - value < worth / self._patience
+        # What was cut short and promised more gets another step.
+        hindered = (limit < 1) & (-slope / 2 > worth) & ~self._little
+        self._little = little
+        return uv, after, (length == 0) | (little & ~hindered)
 
     def _step_of_some(self, domain, uv, going, sound):
         """The map after a step of the `sound` pieces alone, and which are done: equations of flipped triangles are no
@@ -90,7 +98,7 @@ class Descent:
         part, its_uv = domain.of(sound, uv)
         descent = self.of(sound)
         _, its_uv, its_done = yield from descent.step(part, its_uv, going[sound])
-        self._residual[sound] = descent._residual
+        self._residual[sound], self._little[sound] = descent._residual, descent._little
         done = np.ones(len(sound), bool)
         done[sound] = its_done
         after = uv.copy()
