@@ -15,7 +15,7 @@ from .domain import Domain
 from .tensor import area_scale, jacobian, jacobian_of
 from .triangles import by_parts, corners_of, hat_gradients, signed_areas
 
-AIR = 0.15  # air weighs so many times the geometric mean of the energy and of what it lies above its least value,
+AIR = 0.25  # air weighs so many times the geometric mean of the energy and of what it lies above its least value,
 _THIN = 1e-4  # or this where it lies hardly above that
 _FOLLOWING = [1, 2, 0]  # corners
 _SMALLEST = 1e-9  # eigenvalue of the Hessian of a triangle of unit weight
