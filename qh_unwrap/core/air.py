@@ -22,7 +22,8 @@ _WALLED = 0.95  # of the circle's radius, within which walls are kept out of
 _PIECES = 8  # pieces of the circle's radius, of which none of a wall is longer
 _SAMPLES = 5  # points of a wall that the air around keeps its distance from
 _COARSEST = 4  # edges of the coarsest air that reach from the middle to the circle
-_FINEST = 64  # edges of the finest air that reach across the island's radius
+_FINEST = 64  # edges of the finest air that reach across the island's radius, at most,
+_COARSER = 2  # times as long as those of the outline
 
 
 class Air(NamedTuple):
@@ -122,7 +123,7 @@ def _graded_points(start, end, centre, radius, walls):
     length = np.linalg.norm(end - start, axis=1)
     reach = _RADIUS * radius
     coarsest = step = reach / _COARSEST
-    finest = np.clip(length.mean(), radius / _FINEST, coarsest)
+    finest = np.clip(_COARSER * length.mean(), radius / _FINEST, coarsest)
     count = np.maximum(1, np.ceil(length / finest)).astype(int)
     side = np.repeat(np.arange(len(start)), count)
     part = (np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count)) / count[side]
@@ -196,5 +197,6 @@ def _outside(triangles, sides, n):
 
 def quality(corners: np.ndarray) -> np.ndarray:
     """1 for equilateral triangles (t, 3, 2), 0 for flat, negative for flipped ones."""
-    sides = np.roll(corners, -1, axis=1) - corners
-    return 4 * np.sqrt(3) * signed_areas(corners) / (sides**2).sum(axis=(1, 2))
+    x, y = corners.T
+    sides = ((x[[1, 2, 0]] - x) ** 2 + (y[[1, 2, 0]] - y) ** 2).sum(axis=0)
+    return 4 * np.sqrt(3) * signed_areas(corners) / sides

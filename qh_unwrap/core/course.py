@@ -20,13 +20,14 @@ from .improvement import ISOMETRIC, D, Group, Improvement, Steps
 from .pins import lead, way_of
 from .settings import Settings
 from .starts import before_pins, best_start, natural_start, start_within, with_pins
+from .stepping import PART, STEP
 from .untangling import untangled
 
 PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
 PINS_FLIP = "no map without flips was found with these pins: unpin some, or move them"
 _NEAR = 1.2  # the energy of a start from which the refinement alone soon arrives
 _LONG = 1.5  # the squared outline from which on it may well cross itself, relative to that of a disk of the same area
-_IN_AIR = 2000  # triangles of the pieces that are improved together with air around them
+_IN_AIR = 5000  # vertices of the pieces that are improved together with air around them
 _LEADS = 12  # times that pins are moved on, before their island begins anew
 _PATIENCE = 30.0  # with maps that go on, so that they end no higher than those that begin anew
 
@@ -133,7 +134,7 @@ class Course(Improvement):
             yield from self._untangled(group)
         yield from self.improve(group)
 
-    def _forced(self, group: Group, arrived: np.ndarray) -> Generator[None, None, np.ndarray]:
+    def _forced(self, group: Group, arrived: np.ndarray) -> Generator[str, None, np.ndarray]:
         """Put pins in their places that did not arrive there, and turn back what that flips; returns which pieces have
         arrived now, (p',) bool."""
         domain = group.domain
@@ -166,7 +167,8 @@ class Course(Improvement):
             new = ~(good | to_lead)
             if new.any():
                 start = start.copy()
-                start[batch.rows(new)], known = best_start(surface if new.all() else surface.of(new), settings)
+                found = yield from best_start(surface if new.all() else surface.of(new), settings)
+                start[batch.rows(new)], known = found
                 certified = np.zeros(p, bool)
                 certified[new] = known
         elif settings.initial != "CURRENT":
@@ -174,6 +176,7 @@ class Course(Improvement):
         if batch.has_pins.any():
             placed = with_pins(surface, start, batch.uv, batch.pinned)
             start, certified = np.where(batch.rows(to_lead)[:, None], start, placed), None
+        yield PART
         self._begin(start)
         yield from self._freely(start, settings.initial == "AUTO" or not settings.iterations, certified)
 
@@ -185,7 +188,7 @@ class Course(Improvement):
         batch, settings = self.batch, self.settings
         surface, p = batch.surface, batch.surface.piece_count
         if not self.refining and not settings.iterations:
-            yield
+            yield STEP
             return
         near = done = np.zeros(p, bool)
         if self.refining:
@@ -197,7 +200,7 @@ class Course(Improvement):
                 near &= ~(batch.has_pins | batch.has_partners | batch.has_walls)
         self.converged |= done
         if (done | near).any():
-            yield
+            yield STEP
         if near.any():
             winding = surface.outline_lengths**2 > _LONG * 4 * np.pi
             yield from self.refine(self._group(near, start, loose), watched=bool((winding & near).any()))
@@ -339,7 +342,7 @@ class Course(Improvement):
         if late.any():
             start = self.best.copy()
             if self.settings.initial == "AUTO":
-                start[batch.rows(late)], _ = best_start(batch.surface.of(late), self.settings)
+                start[batch.rows(late)], _ = yield from best_start(batch.surface.of(late), self.settings)
             self._put_pins(start, late)
             yield from self._in_air(late, start)
         if not arrived.any():

@@ -2,80 +2,163 @@
 """From a good map to the one of least distortion: projected Newton steps on an energy that no triangle can flip in.
 
 Air takes part, with the shape it has before a step as its rest shape (Jiang, Schaefer, Panozzo 2017), so that the
-outline cannot cross itself.
+outline cannot cross itself.  It has its part in Newton's equations, but none in the energy that tells how long a step
+may be: it will be at rest where the step leads.
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
 
 import numpy as np
 
 from .domain import Domain
 from .energy import Barrier
+from .stepping import PART
 
 _LONGEST = 0.9  # of the step at which a triangle collapses
 _ARMIJO = 1e-4  # of the decrease that the slope promises, the least that is taken
 _HALVINGS = 20  # of the step, at most
+_PROMISING = 0.6  # of what the slope promises: a decrease by more is worth a longer step
+_LONGER = 1.5  # times as long
+_LENGTHENINGS = 4  # of the step, at most
 _NEGLIGIBLE = 1e-3  # a decrease smaller than this, relative to the energy, is not worth another step,
-_LITTLE = 1e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
+_LITTLE = 2e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
 _INVISIBLE = 1e-6  # a decrease of the energy that nobody could see
 _SPRING = 1e-9  # that holds every vertex in its place, relative to what acts on it
-_RESIDUAL = 0.03  # of Newton's equations, relative to the gradient
+_RESIDUAL = 0.03  # of Newton's equations, relative to the gradient,
+_SHARP = 0.002  # and where few triangles rule the gradient, so that the others go where they should not:
+_SHORT = 0.5  # after a step that one that all but collapses has made shorter than this,
+_EXTREME = 20  # or above so many times the least possible energy
 
 
-def newton_step(
-    domain: Domain, uv: np.ndarray, balance: float, size: np.ndarray, going: np.ndarray, patience: float = 1.0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """One step down the energy of the map `uv` (n, 2) in the pieces that are `going` (p,); the others stay.
+class Descent:
+    """Steps down the energy of maps, in every piece of a domain on its own way.
 
-    `size` (p,) is the scale of each piece's map that the energy aims at.  Returns the map before, maybe with new air,
-    the map after, and for which pieces (p,) no further step would pay; with more `patience`, smaller gains do.  Pieces
-    with flips stay and are done.
+    Parameters
+    ----------
+    balance : as in `Settings`
+    size : (p,), the scale of each piece's map that the energy aims at
+    patience : how much smaller gains than usual are worth a step
     """
-    uv = domain.renewed(uv)
-    energy = Barrier(domain, uv, balance, size)
-    before = energy.jacobian(uv)
-    start = energy.value(before)
-    sound = np.isfinite(start)
-    if not (sound & going).any():
-        return uv, uv, np.ones(len(start), bool)
-    if not sound.all():
-        # Equations with flipped triangles are no equations: leave these pieces out.
+
+    def __init__(self, balance: float, size: np.ndarray, patience: float = 1.0):
+        self._balance, self._size, self._patience = balance, size, patience
+        self._residual = np.full(len(size), _RESIDUAL)
+        self._little = np.zeros(len(size), bool)  # whether the last step brought little
+
+    def of(self, pieces: np.ndarray) -> Descent:
+        """The same of the chosen pieces (p,) bool alone."""
+        part = Descent(self._balance, self._size[pieces], self._patience)
+        part._residual, part._little = self._residual[pieces], self._little[pieces]
+        return part
+
+    def step(
+        self, domain: Domain, uv: np.ndarray, going: np.ndarray
+    ) -> Generator[str, None, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """One step from the map `uv` (n, 2) in the pieces that are `going` (p,); the others stay.
+
+        Returns the map before, maybe with new air, the map after, and for which pieces (p,) no further step would pay.
+        Pieces with flips stay and are done.  Yields `PART` now and then.
+        """
+        uv = domain.renewed(uv)
+        energy = Barrier(domain, uv, self._balance, self._size)
+        before = energy.jacobian(uv)
+        start = energy.value(before)
+        sound = np.isfinite(start)
+        if not (sound & going).any():
+            return uv, uv, np.ones(len(start), bool)
+        if not sound.all():
+            some = yield from self._step_of_some(domain, uv, going, sound)
+            return uv, *some
+        gradient, beside, own = _newton_equations(domain, energy, before)
+        yield PART
+        direction = domain.constrained.newton_direction(gradient, beside, own, self._residual)
+        yield PART
+        after, value, moved, slope, limit = _moved(domain, energy, uv, before, start, going, gradient, direction)
+        hard = (limit < _SHORT) | (value > _EXTREME * energy.least)
+        self._residual = np.where(hard, _SHARP, _RESIDUAL)
+        worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
+        little = start - value < worth / self._patience
+        # What was cut short and promised more gets another step.
+        hindered = (limit < 1) & (-slope / 2 > worth) & ~self._little
+        self._little = little
+        return uv, after, ~moved | (little & ~hindered)
+
+    def _step_of_some(self, domain, uv, going, sound):
+        """The map after a step of the `sound` pieces alone, and which are done: equations of flipped triangles are no
+        equations."""
         part, its_uv = domain.of(sound, uv)
-        _, its_uv, its_done = newton_step(part, its_uv, balance, size[sound], going[sound], patience)
-        done = np.ones(len(start), bool)
+        descent = self.of(sound)
+        _, its_uv, its_done = yield from descent.step(part, its_uv, going[sound])
+        self._residual[sound], self._little[sound] = descent._residual, descent._little
+        done = np.ones(len(sound), bool)
         done[sound] = its_done
         after = uv.copy()
         after[sound[domain.vertex_piece]] = its_uv
-        return uv, after, done
-    after, value, moved = descended(domain, energy, uv, before, start, going)
-    worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
-    return uv, after, ~moved | (start - value < worth / patience)
+        return after, done
 
 
 def descended(
     domain: Domain, energy: Barrier, uv: np.ndarray, jacobian: np.ndarray, start: np.ndarray, going: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The map `uv` (n, 2) after Newton's step down the energy in the pieces that are `going` (p,) bool.
+    """The map `uv` (n, 2) after one step down any energy in the pieces that are `going` (p,) bool.
 
-    `jacobian` (2, 2, m) and `start` (p,) are the map's derivative and energy.  Returns the map, the energy that it was
-    last seen with, (p,), and which pieces have moved, (p,) bool.
+    `jacobian` (2, 2, m) and `start` (p,) are the map's derivative and energy.  Returns the map, the energy of every
+    piece, (p,), and which have moved, (p,) bool.
     """
-    gradient, direction = _newton_direction(domain, energy, jacobian)
+    gradient, beside, own = _newton_equations(domain, energy, jacobian)
+    direction = domain.constrained.newton_direction(gradient, beside, own, _RESIDUAL)
+    return _moved(domain, energy, uv, jacobian, start, going, gradient, direction)[:3]
+
+
+def _moved(domain, energy, uv, jacobian, start, going, gradient, direction):
+    """The map after a step of the right length, the energy of every piece, which have moved, and the slope of the
+    energy and the longest step that were looked at, (p,) each."""
     change = energy.jacobian(direction)
-    length = np.where(going, np.minimum(1.0, _LONGEST * energy.longest_step(jacobian, change)), 0.0)
     piece = domain.vertex_piece
-    slope = np.bincount(piece, (gradient * direction).sum(axis=1), len(start))
+    slope = np.bincount(piece, np.einsum("nc,nc->n", gradient, direction), len(start))
+    limit = np.where(going, _LONGEST * energy.longest_step(jacobian, change), 0.0)
+    length, value = _search(
+        lambda length: energy.value(jacobian + domain.triangles.at(length) * change), start, slope, limit
+    )
+    after = uv + (length[0] if len(length) == 1 else length[piece, None]) * direction
+    return after, value, length > 0, slope, limit
+
+
+def _search(
+    energy_at: Callable[[np.ndarray], np.ndarray], start: np.ndarray, slope: np.ndarray, limit: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The length of every piece's step, (p,), not above its `limit`, and the energy there, which is `start` before it.
+
+    Newton's own length is 1.  It is halved until the energy falls.  Where that falls by more than the `slope` promises,
+    as it does far from the end, the step becomes longer as long as that pays.
+    """
+    length = np.minimum(1.0, limit)
+    value = energy_at(length)
     for _ in range(_HALVINGS):
-        value = energy.value(jacobian + domain.triangles.at(length) * change)
         steep = ~(value <= start + _ARMIJO * length * slope)
         if not steep.any():
             break
         length[steep] /= 2
+        value = energy_at(length)
     else:
-        length[steep] = 0
-    return uv + (length[0] if len(length) == 1 else length[piece, None]) * direction, value, length > 0
+        steep = ~(value <= start + _ARMIJO * length * slope)
+        length[steep], value[steep] = 0, start[steep]
+    growing = start - value > -_PROMISING * length * slope
+    for _ in range(_LENGTHENINGS):
+        longer = np.where(growing, np.minimum(_LONGER * length, limit), length)
+        growing = longer > length
+        if not growing.any():
+            break
+        its = energy_at(longer)
+        growing &= its < value
+        length, value = np.where(growing, longer, length), np.where(growing, its, value)
+    return length, value
 
 
-def _newton_direction(domain, energy, jacobian):
-    """The gradient, zero where held, and the direction of descent, (n, 2) each."""
+def _newton_equations(domain, energy, jacobian):
+    """The gradient (n, 2), zero where held, and the Hessian as `Constrained.newton_direction` takes it."""
     n, edges = len(domain.vertex_piece), domain.triangles.edges
     corners, k = energy.corners, len(edges)
     *by_corner, mean, difference, symmetric, anti = energy.derivatives(jacobian)
@@ -90,4 +173,4 @@ def _newton_direction(domain, energy, jacobian):
     own = [-np.bincount(one, part, n) - np.bincount(other, part, n) for part in beside[:3]]
     # What hangs on the rest by nothing but folded faces without area has no equation of its own: it stays.
     own[0] = np.where(own[0] > 0, own[0] * (1 + _SPRING), 1.0)
-    return gradient, domain.constrained.newton_direction(gradient, beside, own, _RESIDUAL)
+    return gradient, beside, own

@@ -23,7 +23,7 @@ from .triangles import corners_of, signed_areas
 
 _WINDING = 25  # squared vertices on the outline, by all vertices, from which on the order is made anew with the air,
 _CHEAP = 10_000  # where there are fewer vertices than this, since it takes long for more
-_WORN = 0.3  # air is renewed when a triangle keeps less than this part of its quality
+_WORN = 0.2  # air is renewed when a triangle keeps less than this part of its quality
 
 
 Walls = Sequence[np.ndarray | None] | None

@@ -15,13 +15,15 @@ from .domain import Domain
 from .tensor import area_scale, jacobian, jacobian_of
 from .triangles import by_parts, corners_of, hat_gradients, signed_areas
 
-AIR = 0.1  # the air's part of the energy
+AIR = 0.25  # air weighs so many times the geometric mean of the energy and of what it lies above its least value,
+_THIN = 1e-4  # or this where it lies hardly above that
+_FOLLOWING = [1, 2, 0]  # corners
 _SMALLEST = 1e-9  # eigenvalue of the Hessian of a triangle of unit weight
 
 
 def exponents(balance: float) -> tuple[float, float]:
     """The powers p and r of the density."""
-    return float(np.clip(4 * balance, 0.05, 1)), min(1.0, 4 / 3 * (1 - balance)) ** 3
+    return min(max(4 * balance, 0.05), 1.0), min(1.0, 4 / 3 * (1 - balance)) ** 3
 
 
 def density(squares: np.ndarray, det: np.ndarray, balance: float) -> np.ndarray:
@@ -57,8 +59,8 @@ class Barrier:
 
     Parameters
     ----------
-    domain : whose charts count; those of air have the shape at rest that they have in `uv`, and together the part `AIR`
-        of the energy
+    domain : whose charts count; those of air have the shape at rest that they have in `uv`, and the less weight the
+        nearer the map is to an isometry, so that air does not hold it back there
     uv : (n, 2), the map that is to be improved
     balance : as in `Settings`
     size : (p,), the scale of each piece's map that the energy aims at
@@ -74,7 +76,7 @@ class Barrier:
         everything = domain.triangles
         self.corners, self._single = everything.corners, len(size) == 1
         self._hats, self._weight = np.empty((2, 2, self.corners.shape[1])), np.empty(self.corners.shape[1])
-        solid = [(chart, part) for chart, part in everything if not chart.is_air]
+        solid = self._solid = [(chart, part) for chart, part in everything if not chart.is_air]
         air = [(chart, part) for chart, part in everything if chart.is_air]
         total = sum(chart.sums(chart.barrier) for chart, _ in solid)
         for chart, part in solid:
@@ -94,9 +96,10 @@ class Barrier:
         if air:
             value = self.value(self.jacobian(uv))
             value = np.where(np.isfinite(value), value, 1.0)  # else the map is given up anyway
+            weight = AIR * np.sqrt(value * np.maximum(value - self.least, _THIN))
             counts = sum(chart.sums(chart.barrier) for chart, _ in air)
             for chart, part in air:
-                self._weight[part] = chart.barrier * self._at(AIR * value / np.maximum(counts, 1), chart)
+                self._weight[part] = chart.barrier * self._at(weight / np.maximum(counts, 1), chart)
 
     def _at(self, values, chart):
         """The values (p,) of the pieces at a chart's triangles, (m,), or the one that there is."""
@@ -105,23 +108,29 @@ class Barrier:
     @property
     def least(self) -> np.ndarray:
         """Its least possible value, where every triangle keeps its shape, (p,)."""
-        return self._domain.triangles.sums(self._weight)
+        return sum(chart.sums(self._weight[its]) for chart, its in self._solid)
 
     def jacobian(self, uv: np.ndarray) -> np.ndarray:
         """The map's derivative in every triangle, (2, 2, m)."""
         return jacobian_of(self.corners, self._hats, uv)
 
     def value(self, jacobian: np.ndarray) -> np.ndarray:
-        """Of each piece, (p,), infinite where a triangle is flipped."""
+        """Of each piece without its air, (p,), infinite where a triangle is flipped, in the air as well."""
         (a, b), (c, d) = jacobian
         det = a * d - b * c
         flipped = ~(det > 0)
-        det = np.where(flipped, 1.0, det)
+        some = flipped.any()
+        if some:
+            det[flipped] = 1
+        total = np.zeros(())
         with np.errstate(over="ignore"):
-            value = self._weight * density(a * a + b * b + c * c + d * d, det, self._balance)
-        if flipped.any():
-            value[flipped & (self._weight > 0)] = np.inf
-        return self._domain.triangles.sums(value)
+            for chart, its in self._solid:
+                squares = a[its] ** 2 + b[its] ** 2 + c[its] ** 2 + d[its] ** 2
+                total = total + chart.sums(self._weight[its] * density(squares, det[its], self._balance))
+        if some:
+            barred = self._domain.triangles.largest(flipped & (self._weight > 0))
+            total = np.where(barred, np.inf, total)
+        return total
 
     def longest_step(self, jacobian: np.ndarray, change: np.ndarray) -> np.ndarray:
         """The smallest positive step of each piece at which a triangle collapses, (p,), or some 1e300."""
@@ -193,7 +202,7 @@ def _derivatives(jacobian, hats, weight, density):
     cos, sin = np.cos(right), np.sin(right)
     x, y = hats[:, 0], hats[:, 1]
     h1, h2 = _with_first(x * cos - y * sin), _with_first(x * sin + y * cos)
-    k1, k2 = np.roll(h1, -1, axis=0), np.roll(h2, -1, axis=0)
+    k1, k2 = h1[_FOLLOWING], h2[_FOLLOWING]
     cos, sin = np.cos(left), np.sin(left)
     along, across = value * g1 * h1, value * g2 * h2
     gradient = cos * along - sin * across, sin * along + cos * across

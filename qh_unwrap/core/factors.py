@@ -69,6 +69,8 @@ class superlu:  # noqa: N801 (it is called like a function, as a `Factorizer`)
         return True
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
+        if self._kind == np.float64:
+            return np.ascontiguousarray(self._factors.solve(rhs))
         with np.errstate(over="ignore"):
             solution = self._factors.solve(rhs.astype(self._kind, order="F", copy=False))  # as SuperLU has it
         return solution.astype(np.float64, order="C", copy=False)

@@ -16,20 +16,22 @@ import numpy as np
 from .batch import Batch
 from .certificate import certified_pieces, orientation, wrong_pieces
 from .chart import Surface
-from .descent import newton_step
+from .descent import Descent
 from .domain import Domain
 from .energy import energies, map_scale
 from .errors import UnwrapError
 from .quasi_harmonic import Iteration
 from .settings import Settings
+from .stepping import PART, STEP
 from .unfolding import unfolded
 
 _HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement
 ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
 _FOLDED = 0.2  # of a surface's area, that flipped triangles may have for it to be worth unfolding
-_FEW = 0.5  # once only this part of the vertices still moves, the others take part no longer
+_FEW = 0.75  # once only this part of the vertices still moves, the others take part no longer
 
-Steps = Generator[None, None, None]
+# They yield `STEP` after each step, and `PART` where one takes long for large islands.
+Steps = Generator[str, None, None]
 
 
 D = TypeVar("D", bound=Domain)
@@ -74,6 +76,7 @@ class Improvement:
     changes : list of lists, for every step of a piece the largest movement of a vertex by the layout's diameter
     valid : (p,) bool, in the latest map nothing is flipped, air included
     converged : (p,) bool, another step would change nothing, or would not pay
+    unfinished : (p,) bool, the refinement came to the limit of its steps
     repaired : (p,) bool, weights had to be changed to turn flipped triangles back
     sure : (p,) bool, the best map is known to be certified where it is put in the end
     warnings : list of tuples
@@ -87,7 +90,7 @@ class Improvement:
         n, p = len(batch.uv), batch.surface.piece_count
         self.start, self.now, self.best = (np.zeros((n, 2)) for _ in range(3))
         self.changes: list[list[float]] = [[] for _ in range(p)]
-        self.valid, self.converged, self.repaired, self.sure = (np.zeros(p, bool) for _ in range(4))
+        self.valid, self.converged, self.unfinished, self.repaired, self.sure = (np.zeros(p, bool) for _ in range(5))
         self.warnings: list[tuple[str, ...]] = [()] * p
         self.faults: dict[int, UnwrapError] = {}
         self.live: Group | None = None
@@ -127,7 +130,7 @@ class Improvement:
         self._note(group, valid, iteration.repaired, None, going)
         number = 0
         while True:
-            yield
+            yield STEP
             island = group.domain.island
             # Repairs and new air make the energy rise and fall: keep the best valid map from then on.
             uneven = iteration.repaired | self.refining | (settings.boundary == "FREE")
@@ -164,6 +167,7 @@ class Improvement:
                 rest.uv = iteration.of(going, group.uv)
                 rest.domain, group, going = iteration.domain, rest, np.ones(len(rest.pieces), bool)
             number += 1
+            yield PART
             before, after, now_valid = iteration.step(group.uv)
             group.uv = before
             previous = group.island_uv.copy()
@@ -198,12 +202,14 @@ class Improvement:
         Pieces that are `watched` stop where their outlines come to cross themselves in the first step, as most that do.
         """
         settings = self.settings
-        size = map_scale(group.domain.island, group.island_uv)
+        yield PART
+        descent = Descent(settings.balance, map_scale(group.domain.island, group.island_uv), self.patience)
         going = np.ones(len(group.pieces), bool)
+        self.unfinished[group.pieces] = False
         folded = _folded(group)
         for number in range(settings.refine):
             domain = group.domain
-            before, after, done = newton_step(domain, group.uv, settings.balance, size, going, self.patience)
+            before, after, done = yield from descent.step(domain, group.uv, going)
             if after is before:
                 return
             group.uv = before
@@ -221,12 +227,13 @@ class Improvement:
             going &= ~done
             if watched and number == 0 and going.any():
                 going &= certified_pieces(island, group.island_uv)
-            yield
+            yield STEP
             if not going.any():
                 return
             if group.shares(going) <= _FEW:
-                group, size, folded = group.of(going), size[going], folded[going]
+                group, descent, folded = group.of(going), descent.of(going), folded[going]
                 going = np.ones(len(group.pieces), bool)
+        self.unfinished[group.pieces[going]] = True
 
     def _note(self, group, valid, repaired, change, going):
         """Keep what the latest step has brought, for the pieces that are `going` (p',) bool."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from .errors import PinError, UnwrapError, UVError
 from .improvement import Steps
 from .report import Report, Result, Shape, State, face_warnings
 from .settings import Settings
+from .stepping import STEP
+
+_GO_ON = "set Refine higher, or unwrap it again from the current UVs"
 
 
 class Unwrapper:
@@ -48,13 +51,17 @@ class Unwrapper:
 
     def step(self) -> bool:
         """Go one step further; returns whether there was anything left to do."""
-        if self._steps is None:
-            return False
-        self._began = True
-        for _ in self._steps:
-            return True
-        self._steps = None
-        return False
+        return any(part == STEP for part in self.parts())
+
+    def parts(self) -> Iterator[str]:
+        """Go on; yields `STEP` after each step, and `PART` within one that takes long."""
+        while self._steps is not None:
+            self._began = True
+            for part in self._steps:
+                yield part
+                break
+            else:
+                self._steps = None
 
     @property
     def settings(self) -> Settings:
@@ -172,6 +179,9 @@ class Unwrapper:
                 yield course.faults[k]
                 continue
             warnings = course.warnings[k]
+            if course.unfinished[k]:
+                steps = course.settings.refine
+                warnings += (f"it was still improving after {steps} steps: {_GO_ON}",)
             if flat[k]:
                 its = surface.degenerate[ends[k] : ends[k + 1]]
                 warnings += face_warnings(its, given.face(int(batch.index[k])))

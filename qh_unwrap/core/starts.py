@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -16,6 +17,7 @@ from .energy import energies
 from .initial import conformal, fit, led, project, weighted_map
 from .rings import ring_map
 from .settings import Settings
+from .stepping import PART
 from .triangles import corners_of, signed_areas
 from .unfolding import unfolded
 
@@ -46,10 +48,10 @@ def _weighted_or_ring_map(domain, initial):
     return ring_map(domain) if initial == "RINGS" else weighted_map(domain, initial)
 
 
-def best_start(surface: Surface, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tuple[np.ndarray, np.ndarray]]:
     """Of the certified natural maps of every piece a good one, or that of least energy; of all, if none is certified.
 
-    Returns the map (n, 2), and for which pieces (p,) it is certified.
+    Returns the map (n, 2), and for which pieces (p,) it is certified; yields `PART` now and then.
     """
     start, least = np.zeros((len(surface.vertices), 2)), np.full(surface.piece_count, np.inf)
     certified, undecided = np.zeros(surface.piece_count, bool), np.ones(surface.piece_count, bool)
@@ -61,6 +63,10 @@ def best_start(surface: Surface, settings: Settings) -> tuple[np.ndarray, np.nda
             continue
         pieces = np.flatnonzero(trying)
         part = surface if trying.all() else surface.of(trying)
+        if initial == "CONFORMAL":
+            yield PART
+            part.order  # noqa: B018 (it is kept)
+            yield PART
         uv, _ = unfolded(part, natural_start(part, settings, initial), np.zeros((len(part.vertices), 2), bool), _TRACE)
         value = energies(part, uv, settings.balance)
         # What could be better is worth the certificate.

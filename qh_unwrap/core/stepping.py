@@ -4,6 +4,8 @@
 from collections.abc import Callable, Generator
 from typing import Any, TypeVar
 
+STEP, PART = "step", "part"  # what is yielded after a step, and within one, so that whoever waits can be heard
+
 _Step = TypeVar("_Step")
 _Mapped = TypeVar("_Mapped")
 _Result = TypeVar("_Result")

@@ -240,10 +240,15 @@ class Constrained:
         return result
 
     def newton_direction(
-        self, gradient: np.ndarray, beside: Sequence[np.ndarray], own: Sequence[np.ndarray], residual: float
+        self,
+        gradient: np.ndarray,
+        beside: Sequence[np.ndarray],
+        own: Sequence[np.ndarray],
+        residual: np.ndarray | float,
     ) -> np.ndarray:
         """The direction (n, 2) of Newton's step, 0 where held, for a `gradient` (n, 2) and a positive definite Hessian
-        of blocks as `Pattern.block_matrix` takes them, up to a `residual` relative to the gradient, in every piece.
+        of blocks as `Pattern.block_matrix` takes them, up to a `residual` relative to the gradient in every piece: one
+        number, or (p,).
 
         By conjugate gradients, with both coordinates' own matrices as preconditioner: their mean, where the same
         vertices are free in both.
@@ -322,13 +327,14 @@ class Constrained:
         """A solution and whether it misses the `residual` somewhere; every piece takes steps of its own length."""
         if self._group is None:
             dot, at_unknowns, ratio = np.vdot, float, _ratio_of_numbers
+            residual = float(np.max(residual))
         else:
             group = np.concatenate([self._group[unknowns.sequence] for unknowns in self.unknowns])
             count = int(self._group.max()) + 1
             ratio = _ratio
 
             def dot(one, other):
-                return np.bincount(group, (one * other).sum(axis=1), count)
+                return np.bincount(group, np.einsum("nc,nc->n", one, other), count)
 
             def at_unknowns(values):
                 return values[group, None]

@@ -17,24 +17,26 @@ from .descent import descended
 from .domain import Domain
 from .energy import Barrier, map_scale
 from .errors import SingularError
+from .stepping import PART
 from .triangles import hat_gradients
 
 _STEPS = 150  # at most
 _STALLED = 1e-2  # a decrease smaller than this, relative to the energy, makes the energy less bent
 _AT_ONCE = 20  # steps, after which it becomes less bent anyway
+_LONG = 1.2  # steps at most, relative to Newton's own
 _SHARPER = 0.7  # how bent it is then, relative to before
 _LEAST_BENT = 1e-7  # relative to a triangle's area at rest, beyond which nothing else is to be expected
 
 
 def untangled(
     domain: Domain, uv: np.ndarray, before: np.ndarray | None = None
-) -> Generator[None, None, tuple[np.ndarray, np.ndarray]]:
+) -> Generator[str, None, tuple[np.ndarray, np.ndarray]]:
     """Turn flipped triangles of the map `uv` (n, 2) back, in those pieces that have any.
 
     before  (n, 2), a map in which the air is as it lies at rest; by default `uv`
 
-    A generator: yields after each step, returns the map and in which pieces (p,) bool nothing is flipped now; others
-    are as they were.
+    A generator: yields `PART` after each step, returns the map and in which pieces (p,) bool nothing is flipped now;
+    others are as they were.
     """
     size = map_scale(domain.island, uv)
     moved, sound = yield from pressed_open(domain, uv, size, lambda now: ~wrong_pieces(domain.charts, now), 1.0, before)
@@ -48,7 +50,7 @@ def pressed_open(
     is_open: Callable[[np.ndarray], np.ndarray],
     bent: float,
     before: np.ndarray | None = None,
-) -> Generator[None, None, tuple[np.ndarray, np.ndarray]]:
+) -> Generator[str, None, tuple[np.ndarray, np.ndarray]]:
     """Descend the energy of the map `uv` (n, 2), less and less bent, until `is_open` says of a piece that it may end.
 
     size     (p,), the scale of each piece's map
@@ -56,7 +58,7 @@ def pressed_open(
     bent     how much the energy is bent at first
     before   as in `untangled`
 
-    A generator: yields after each step, returns the map and what is open, (p,) bool.
+    A generator: yields `PART` after each step, returns the map and what is open, (p,) bool.
     """
     start, sound = uv, is_open(uv)
     bends = np.full(len(sound), bent)
@@ -83,7 +85,7 @@ def pressed_open(
         stalled |= since > _AT_ONCE
         bends, since = np.where(stalled, bends * _SHARPER, bends), np.where(stalled, 0, since)
         going = ~sound & (bends > _LEAST_BENT)
-        yield
+        yield PART
     return uv, sound
 
 
@@ -113,7 +115,8 @@ class _Bent(Barrier):
         return self._domain.triangles.sums(value)
 
     def longest_step(self, _jacobian: np.ndarray, _change: np.ndarray) -> np.ndarray:
-        return np.full(self._domain.island.piece_count, np.inf)
+        # Newton's own length, and a little more, since nothing is in the way
+        return np.full(self._domain.island.piece_count, _LONG)
 
     def _density(self, s1, s2, bent):
         det = s1 * s2

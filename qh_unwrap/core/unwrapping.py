@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Generator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -15,12 +16,13 @@ from .importance import corrected, is_uneven
 from .report import Result, Shape, State
 from .session import Unwrapper
 from .settings import Settings
-from .stepping import mapped
+from .stepping import PART, STEP, mapped
 
 _TOGETHER = 2000  # triangles of the largest island that goes together with others
 _AT_ONCE = 60_000  # triangles of islands that go together
 _FIXED = 300  # triangles that take as long as what an island takes whatever its size
-_LEFT = 0.85  # of an island after each step, by and large
+_LEFT = 0.75  # of an island after each step, by and large,
+_LEFT_OF_PART = 0.95  # and after a part of one
 
 
 def unwrap(
@@ -104,8 +106,8 @@ def _unwrapped(shapes, settings, triangulate):
             memory.check(sum(len(shapes[k].vertices) for k in portion), memory.free())
             session = Unwrapper([shapes[k] for k in portion], settings, triangulate)
             left = 1.0
-            while session.step():
-                left *= _LEFT
+            for part in chain([PART], session.parts()):
+                left *= _LEFT if part == STEP else _LEFT_OF_PART
                 furthest = max(furthest, done + its_work * (1 - left))  # what is taken apart begins anew
                 yield furthest
             results = session.results()

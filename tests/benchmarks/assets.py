@@ -21,6 +21,7 @@ from .measuring import islands_of, judged_islands, outline
 BEAST = "beast_quads_uv.obj"
 GRIDS = (20, 50, 120, 250)  # quads along a side
 SHEETS = {500: 7, 300: 12, 200: 17, 100: 24, 40: 39}  # how many an asset has, and quads along a side of each
+LARGE = 9000  # triangles
 SLACK = 1.001  # so many times Minimum Stretch's energy still is no more
 HEADER = (
     *("mesh", "triangles", "islands", "outline", "seconds", "Min. S.", "times ours", "energy", "Min. S.", "ratio"),
@@ -148,6 +149,9 @@ def summarize(found):
     worst = f"{ratio.max():.5f} ({found[ratio.argmax()]['mesh']})"
     print(f"Our energy is {np.median(ratio):.5f} times that of {STRETCH_10} (median), at worst {worst}")
     slower, more = (times < 1).sum(), (ratio > SLACK).sum()
+    large = times[[row["triangles"] >= LARGE for row in found]]
+    if 0 < len(large) < len(found):
+        print(f"Of {LARGE:,} triangles and more: {np.median(large):.2f} times in the median")
     print(f"{slower} of {len(found)} are slower, {more} have more than {SLACK} times the energy\n")
 
 

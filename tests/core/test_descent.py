@@ -7,8 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qh_unwrap.core import Settings, Surface, distortion, unwrap
-from qh_unwrap.core.domain import Fixed, Held
+from qh_unwrap.core.delaunay import triangulate
+from qh_unwrap.core.descent import Descent
+from qh_unwrap.core.domain import Fixed, Held, Plane, airs_around, loose
 from qh_unwrap.core.energy import Barrier, energies
+from qh_unwrap.core.stepping import finished
 
 from . import shapes
 from .test_tensor import seeds
@@ -79,6 +82,47 @@ def test_the_minimum_is_the_same_from_every_start():
     ]
     for uv in reached[1:]:
         np.testing.assert_allclose(uv, reached[0], atol=5e-3)
+
+
+def squashed(seed, part):
+    """A surface and a map of it of which a part in the middle is all but collapsed."""
+    vertices, triangles = shapes.bump(seed)
+    uv = vertices[:, :2].copy()
+    return Surface(vertices, triangles), uv * np.where(np.linalg.norm(uv, axis=1, keepdims=True) < 0.4, part, 1)
+
+
+def test_far_from_the_end_steps_go_farther_than_newton_s():
+    surface, uv = squashed(8, 1e-3)
+    domain, going = loose(surface, uv, None), np.ones(1, bool)
+    descent = Descent(0.25, np.ones(1))
+    values = [energies(surface, uv, 0.25)[0]]
+    for _ in range(6):
+        _, uv, _ = finished(descent.step(domain, uv, going))
+        values.append(energies(surface, uv, 0.25)[0])
+    # Newton's own length would divide the energy by 16 / 9 in each.
+    assert values[-1] < values[0] / 100
+
+
+def test_air_holds_no_step_back():
+    surface, uv = bent(9)[:2]
+    domain = Plane(surface, uv, Fixed(np.zeros(uv.shape, bool), uv), airs_around(surface, uv, triangulate), triangulate)
+    uv = domain.start(uv)
+    barrier = Barrier(domain, uv, 0.25, np.ones(1))
+    jacobian = barrier.jacobian(uv)
+    squeezed = jacobian.copy()
+    squeezed[..., len(surface.triangles) :] *= 0.5
+    np.testing.assert_array_equal(barrier.value(squeezed), barrier.value(jacobian))
+    squeezed[0, :, -1] *= -1
+    assert np.isinf(barrier.value(squeezed)).all()
+
+
+def test_what_was_still_improving_is_told():
+    vertices, triangles = shapes.hemisphere(14, flattening=6)
+    stopped = unwrap(vertices, triangles, Settings(refine=2)).report
+    (warning,) = stopped.warnings
+    assert not stopped.converged and warning.startswith("it was still improving after 2 steps: set Refine higher")
+    ended = unwrap(vertices, triangles).report
+    assert ended.converged and not ended.warnings
 
 
 def test_held_vertices_stay():

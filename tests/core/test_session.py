@@ -20,7 +20,7 @@ from qh_unwrap.core import (
     unwrap_islands,
 )
 from qh_unwrap.core.energy import density, map_scale
-from qh_unwrap.core.stepping import finished
+from qh_unwrap.core.stepping import PART, STEP, finished
 from qh_unwrap.core.tensor import jacobian
 
 from . import shapes
@@ -295,18 +295,29 @@ def test_cancelled_it_holds_nothing_back(bump, after):
         session.results()
 
 
+def test_parts_of_steps_are_yielded_and_are_no_steps(bump):
+    whole, inner = Unwrapper([Shape(*bump)]), Unwrapper([Shape(*bump)])
+    steps = 0
+    while whole.step():
+        steps += 1
+    yielded = list(inner.parts())
+    assert yielded.count(STEP) == steps and yielded.count(PART) >= steps
+    np.testing.assert_array_equal(inner.results()[0].uv, whole.results()[0].uv)
+
+
 @pytest.mark.parametrize("way", ["closed", "failed"])
 def test_a_run_that_ends_half_way_holds_nothing_back(bump, monkeypatch, way):
-    held, original = [], Unwrapper.step
+    held, original = [], Unwrapper.parts
 
-    def step(session):
-        if session._course is not None:
-            held.append(weakref.ref(session._course))
-            if way == "failed" and len(held) > 2:
-                raise ZeroDivisionError
-        return original(session)
+    def parts(session):
+        for part in original(session):
+            if session._course is not None:
+                held.append(weakref.ref(session._course))
+                if way == "failed" and len(held) > 2:
+                    raise ZeroDivisionError
+            yield part
 
-    monkeypatch.setattr(Unwrapper, "step", step)
+    monkeypatch.setattr(Unwrapper, "parts", parts)
     vertices, triangles = bump[0].copy(), bump[1].copy()
     run = unwrap_islands([Shape(vertices, triangles)])
     if way == "closed":
