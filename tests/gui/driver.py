@@ -225,7 +225,7 @@ def _heatmap(gui):
     bpy.context.scene.qh_heatmap.property_unset("quantity")
     with gui.override('VIEW_3D'):
         bpy.ops.uv.qh_unwrap()
-    yield 2
+    yield 4
     gui.shot("25_heatmap_followed.png")
     with gui.override('VIEW_3D'):
         bpy.ops.object.mode_set(mode='OBJECT')
@@ -239,7 +239,7 @@ def _heatmap(gui):
 
 
 def _compare(gui):
-    """A table of what methods make of copies, and a plot in a window of its own."""
+    """A table of what methods make of copies, and a plot in the Image Editor that there is."""
     before = _uvs()
     gui.move('VIEW_3D', fx=0.4, fy=0.5)
     with gui.override('VIEW_3D'):
@@ -250,14 +250,17 @@ def _compare(gui):
     gui.shot("28_table.png")
     gui.key("Escape")
     yield 1
+    editor = gui.area('IMAGE_EDITOR')
+    editor.ui_type = 'IMAGE_EDITOR'
+    yield 1
     with gui.override('VIEW_3D'):
         bpy.ops.uv.qh_plot('INVOKE_DEFAULT')
     yield 2
     yield from _end(gui)
     yield 1
     gui.shot("29_plot.png")
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
-        bpy.ops.wm.window_close()
+    assert editor.spaces.active.image == bpy.data.images["QH Unwrap Distortion"]
+    editor.ui_type = 'UV'
     yield 1
     assert np.array_equal(_uvs(), before), "the comparison changed something"
 
