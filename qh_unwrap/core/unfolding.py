@@ -27,7 +27,8 @@ _RINGS = (1, 3, 8)  # of triangles that give way
 _ROOM = 1e-6  # height of a triangle, relative to the piece's extent, that survives rounding
 _THICKER = 2  # than the height that survives, to reach that
 _BENT = 0.1  # how far the energy is bent at first, relative to a triangle's area at rest
-_PARTS = (0.03, 0.06, 0.12, 0.25, 0.5)  # of the way, one of which may be enough
+_LONGEST = 0.2  # of the steps, relative to Newton's own
+_PARTS = (1e-4, 1e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8)  # of the way, one of which may be enough
 _MOST = 500  # flipped triangles with area of a piece, above which it would take too long
 
 
@@ -173,7 +174,7 @@ def _descended(uv, corners, hats, free, needed):
         return np.array([(_heights(moved, corners) >= needed).all()])
 
     patch = _Patch(uv, corners, hats, free)
-    far, _ = finished(pressed_open(patch, uv, np.ones(1), is_open, _BENT))
+    far, _ = finished(pressed_open(patch, uv, np.ones(1), is_open, _BENT, _LONGEST))
     nearer = (np.where(free, uv + part * (far - uv), uv) for part in _PARTS)
     return next((moved for moved in nearer if is_open(moved)[0]), far)
 

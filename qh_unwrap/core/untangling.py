@@ -39,7 +39,11 @@ def untangled(
     others are as they were.
     """
     size = map_scale(domain.island, uv)
-    moved, sound = yield from pressed_open(domain, uv, size, lambda now: ~wrong_pieces(domain.charts, now), 1.0, before)
+
+    def is_open(now):
+        return ~wrong_pieces(domain.charts, now)
+
+    moved, sound = yield from pressed_open(domain, uv, size, is_open, 1.0, _LONG, before)
     return np.where(sound[domain.vertex_piece, None], moved, uv), sound
 
 
@@ -49,6 +53,7 @@ def pressed_open(
     size: np.ndarray,
     is_open: Callable[[np.ndarray], np.ndarray],
     bent: float,
+    longest: float,
     before: np.ndarray | None = None,
 ) -> Generator[str, None, tuple[np.ndarray, np.ndarray]]:
     """Descend the energy of the map `uv` (n, 2), less and less bent, until `is_open` says of a piece that it may end.
@@ -56,6 +61,7 @@ def pressed_open(
     size     (p,), the scale of each piece's map
     is_open  a function of maps (n, 2) that returns for every piece, (p,) bool, whether nothing is flipped
     bent     how much the energy is bent at first
+    longest  of the steps, relative to Newton's own: shorter ones go no farther than need be
     before   as in `untangled`
 
     A generator: yields `PART` after each step, returns the map and what is open, (p,) bool.
@@ -68,7 +74,7 @@ def pressed_open(
             break
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                energy = _Bent(domain, start if before is None else before, size, bends)
+                energy = _Bent(domain, start if before is None else before, size, bends, longest)
                 jacobian = energy.jacobian(uv)
                 value = energy.value(jacobian)
                 after, now, moved = descended(domain, energy, uv, jacobian, value, going)
@@ -92,8 +98,8 @@ def pressed_open(
 class _Bent(Barrier):
     """An energy of maps with flipped triangles, finite as much as it is `bent` (p,), relative to triangles at rest."""
 
-    def __init__(self, domain: Domain, before: np.ndarray, size: np.ndarray, bent: np.ndarray):
-        self._domain = domain
+    def __init__(self, domain: Domain, before: np.ndarray, size: np.ndarray, bent: np.ndarray, longest: float):
+        self._domain, self._longest = domain, longest
         everything = domain.triangles
         self.corners, self._single = everything.corners, len(size) == 1
         self._hats = np.empty((2, 2, self.corners.shape[1]))
@@ -115,8 +121,7 @@ class _Bent(Barrier):
         return self._domain.triangles.sums(value)
 
     def longest_step(self, _jacobian: np.ndarray, _change: np.ndarray) -> np.ndarray:
-        # Newton's own length, and a little more, since nothing is in the way
-        return np.full(self._domain.island.piece_count, _LONG)
+        return np.full(self._domain.island.piece_count, self._longest)
 
     def _density(self, s1, s2, bent):
         det = s1 * s2
