@@ -11,25 +11,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize
 
 from .air import Triangulator, make_air
 from .certificate import certified_pieces, orientation
-from .chart import Chart, Surface, numbered_edges
-from .domain import Triangles
+from .chart import Surface
 from .energy import map_scale
-from .ordering import banded
-from .stepping import finished
-from .systems import Constrained
+from .tensor import jacobian_of
 from .triangles import corners_of, hat_gradients, laid_flat, signed_areas
-from .untangling import pressed_open
 
 _RINGS = (1, 3, 8)  # of triangles that give way
 _ROOM = 1e-6  # height of a triangle, relative to the piece's extent, that survives rounding
 _THICKER = 2  # than the height that survives, to reach that
-_BENT = 0.1  # how far the energy is bent at first, relative to a triangle's area at rest
-_LONGEST = 0.2  # of the steps, relative to Newton's own
-_PARTS = (1e-4, 1e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8)  # of the way, one of which may be enough
+_BENT = (1e-1, 1e-2, 1e-3)  # how far the energy is bent to be finite, relative to a triangle's area at rest
 _MOST = 500  # flipped triangles with area of a piece, above which it would take too long
+_STEPS = 100  # of the descent, at most
 
 
 def unfolded(surface: Surface, uv: np.ndarray, held: np.ndarray, most: float) -> tuple[np.ndarray, np.ndarray]:
@@ -150,33 +146,37 @@ def _opened(net, uv, held, wrong, rings, room):
     return uv
 
 
-class _Patch:
-    """Triangles with the `corners` (3, m) and gradients of hats (2, 2, m) as a domain in which only the `free`
-    coordinates (n, 2) bool of the map `uv` (n, 2) move."""
-
-    def __init__(self, uv, corners, hats, free):
-        n, m = len(uv), corners.shape[1]
-        edges, triangle_edges = numbered_edges(corners.T, n)
-        ones = np.ones(m)
-        self.island = Chart(corners.T, edges, triangle_edges, np.empty((m, 3, 2)), ones, ones, np.zeros(m, int), 1)
-        self.island.hats = hats
-        self.charts = [self.island]
-        self.vertex_piece = np.zeros(n, int)
-        self.triangles = Triangles(self.charts, n)
-        self.constrained = Constrained(banded(n, edges), edges, ~free, uv)
-
-
 def _descended(uv, corners, hats, free, needed):
     """The map (n, 2) of triangles with the `corners` (3, m) after the descent of the `free` coordinates (n, 2) bool,
-    which ends once all triangles have the `needed` heights (m,), and goes no farther than that."""
+    which ends once all triangles have the `needed` heights (m,)."""
+    moved, x = uv.copy(), uv[free]
 
-    def is_open(moved):
-        return np.array([(_heights(moved, corners) >= needed).all()])
+    def at(x):
+        moved[free] = x
+        return moved
 
-    patch = _Patch(uv, corners, hats, free)
-    far, _ = finished(pressed_open(patch, uv, np.ones(1), is_open, _BENT, _LONGEST))
-    nearer = (np.where(free, uv + part * (far - uv), uv) for part in _PARTS)
-    return next((moved for moved in nearer if is_open(moved)[0]), far)
+    def is_open(x):
+        return (_heights(at(x), corners) >= needed).all()
+
+    def stop_if_open(intermediate_result):
+        if is_open(intermediate_result.x):
+            raise StopIteration
+
+    left = len(needed) + 1
+    for bent in _BENT:
+        x = minimize(
+            lambda x, bent=bent: _energy(at(x), corners, hats, bent, free),
+            x,
+            jac=True,
+            method="L-BFGS-B",
+            callback=stop_if_open,
+            options=dict(maxiter=_STEPS),
+        ).x
+        still = int((_heights(at(x), corners) < needed).sum())
+        if not still or still >= left:
+            break
+        left = still
+    return at(x)
 
 
 def _heights(uv, corners):
@@ -184,3 +184,33 @@ def _heights(uv, corners):
     corners = corners_of(uv, corners.T)
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     return 2 * signed_areas(corners) / np.maximum(longest, np.finfo(float).tiny)
+
+
+def _energy(uv, corners, hats, bent, free):
+    """The energy of the triangles with these `corners` (3, m), and its gradient by the free coordinates.
+
+    Where a step goes so far that there are no numbers for it, the energy is high, and the step is not taken.
+    """
+    with np.errstate(all="ignore"):
+        value, gradient = _energy_anywhere(uv, corners, hats, bent)
+    if not (np.isfinite(value) and np.isfinite(gradient).all()):
+        return 1e300, np.zeros(int(free.sum()))
+    return value, gradient[free]
+
+
+def _energy_anywhere(uv, corners, hats, bent):
+    (a, b), (c, d) = jacobian_of(corners, hats, uv)
+    det = a * d - b * c
+    root = np.sqrt(det * det + bent * bent)
+    # The determinant where it is large, and positive always; without cancellation where it is negative.
+    bar = np.where(det > 0, det + root, bent * bent / (root + np.abs(det))) / 2
+    top = (a * a + b * b + c * c + d * d + det * det + 1) / 2
+    value = top / bar
+    slope = det / bar - value / bar * (1 + det / root) / 2  # by the determinant
+    gradient = np.zeros_like(uv)
+    x, y = (np.array([-first - second, first, second]) for first, second in hats.swapaxes(0, 1))
+    for column, (one, other) in enumerate(
+        ((a / bar + slope * d, b / bar - slope * c), (c / bar - slope * b, d / bar + slope * a))
+    ):
+        gradient[:, column] = np.bincount(corners.ravel(), (one * x + other * y).ravel(), len(uv))
+    return value.sum(), gradient

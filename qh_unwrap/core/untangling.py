@@ -8,7 +8,7 @@ arrive after some twenty where descents along gradients are still under way afte
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 
 import numpy as np
 
@@ -38,43 +38,16 @@ def untangled(
     A generator: yields `PART` after each step, returns the map and in which pieces (p,) bool nothing is flipped now;
     others are as they were.
     """
+    start, sound = uv, ~wrong_pieces(domain.charts, uv)
     size = map_scale(domain.island, uv)
-
-    def is_open(now):
-        return ~wrong_pieces(domain.charts, now)
-
-    moved, sound = yield from pressed_open(domain, uv, size, is_open, 1.0, _LONG, before)
-    return np.where(sound[domain.vertex_piece, None], moved, uv), sound
-
-
-def pressed_open(
-    domain: Domain,
-    uv: np.ndarray,
-    size: np.ndarray,
-    is_open: Callable[[np.ndarray], np.ndarray],
-    bent: float,
-    longest: float,
-    before: np.ndarray | None = None,
-) -> Generator[str, None, tuple[np.ndarray, np.ndarray]]:
-    """Descend the energy of the map `uv` (n, 2), less and less bent, until `is_open` says of a piece that it may end.
-
-    size     (p,), the scale of each piece's map
-    is_open  a function of maps (n, 2) that returns for every piece, (p,) bool, whether nothing is flipped
-    bent     how much the energy is bent at first
-    longest  of the steps, relative to Newton's own: shorter ones go no farther than need be
-    before   as in `untangled`
-
-    A generator: yields `PART` after each step, returns the map and what is open, (p,) bool.
-    """
-    start, sound = uv, is_open(uv)
-    bends = np.full(len(sound), bent)
+    bent = np.ones(len(sound))
     going, since = ~sound, np.zeros(len(sound), int)
     for _ in range(_STEPS):
         if not going.any():
             break
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                energy = _Bent(domain, start if before is None else before, size, bends, longest)
+                energy = _Bent(domain, start if before is None else before, size, bent)
                 jacobian = energy.jacobian(uv)
                 value = energy.value(jacobian)
                 after, now, moved = descended(domain, energy, uv, jacobian, value, going)
@@ -86,20 +59,20 @@ def pressed_open(
         if not np.isfinite(after).all():
             break
         uv = after
-        sound |= going & is_open(uv)
+        sound |= going & ~wrong_pieces(domain.charts, uv)
         since += 1
         stalled |= since > _AT_ONCE
-        bends, since = np.where(stalled, bends * _SHARPER, bends), np.where(stalled, 0, since)
-        going = ~sound & (bends > _LEAST_BENT)
+        bent, since = np.where(stalled, bent * _SHARPER, bent), np.where(stalled, 0, since)
+        going = ~sound & (bent > _LEAST_BENT)
         yield PART
-    return uv, sound
+    return np.where(sound[domain.vertex_piece, None], uv, start), sound
 
 
 class _Bent(Barrier):
     """An energy of maps with flipped triangles, finite as much as it is `bent` (p,), relative to triangles at rest."""
 
-    def __init__(self, domain: Domain, before: np.ndarray, size: np.ndarray, bent: np.ndarray, longest: float):
-        self._domain, self._longest = domain, longest
+    def __init__(self, domain: Domain, before: np.ndarray, size: np.ndarray, bent: np.ndarray):
+        self._domain = domain
         everything = domain.triangles
         self.corners, self._single = everything.corners, len(size) == 1
         self._hats = np.empty((2, 2, self.corners.shape[1]))
@@ -121,7 +94,8 @@ class _Bent(Barrier):
         return self._domain.triangles.sums(value)
 
     def longest_step(self, _jacobian: np.ndarray, _change: np.ndarray) -> np.ndarray:
-        return np.full(self._domain.island.piece_count, self._longest)
+        # Newton's own length, and a little more, since nothing is in the way
+        return np.full(self._domain.island.piece_count, _LONG)
 
     def _density(self, s1, s2, bent):
         det = s1 * s2

@@ -17,6 +17,7 @@ import numpy as np
 from qh_unwrap.addon import mesh_arrays
 from qh_unwrap.core import UnwrapError, distortion
 from qh_unwrap.core.regions import Connected, Selection
+from qh_unwrap.core.triangles import signed_areas
 
 from .common import Verdicts, load_polygons, paths_in
 from .in_blender import _in_edit_mode, _silence, extension
@@ -155,8 +156,7 @@ def _energy(mesh, islands, uv):
 
 
 def _winding(uv, triangles):
-    a, b, c = uv[triangles].transpose(1, 0, 2)
-    return 1 if np.cross(b - a, c - a).sum() > 0 else -1
+    return 1 if signed_areas(uv[triangles]).sum() > 0 else -1
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from qh_unwrap.core import Settings, Shape, Surface, errors, locality, unwrap, u
 from qh_unwrap.core.certificate import certified_pieces, orientation
 from qh_unwrap.core.delaunay import triangulate
 from qh_unwrap.core.stepping import finished
-from qh_unwrap.core.unfolding import unfolded, unfolded_in_air
+from qh_unwrap.core.unfolding import _energy, unfolded, unfolded_in_air
 
 from . import shapes
 
@@ -53,6 +53,23 @@ def test_what_cannot_be_opened_stays_as_it_was():
         opened, done = unfolded(surface, uv, held, most)
         assert not done.any()
         np.testing.assert_array_equal(opened, uv)
+
+
+@pytest.mark.parametrize("bent", [1e-1, 1e-3])
+def test_the_gradient_is_that_of_the_energy(bent):
+    surface, _, uv = thrown(5, 3)
+    free = np.ones_like(uv, dtype=bool)
+
+    def value(x):
+        return _energy(x, surface.triangles.T, surface.hats, bent, free)
+
+    rng = np.random.default_rng(0)
+    gradient = value(uv)[1]
+    for _ in range(5):
+        way = rng.normal(size=uv.shape)
+        step = 1e-8 * way
+        slope = (value(uv + step)[0] - value(uv - step)[0]) / 2e-8
+        assert slope == pytest.approx(gradient @ way.ravel(), rel=1e-2)
 
 
 def plate(sides, points, rng):

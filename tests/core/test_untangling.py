@@ -58,7 +58,7 @@ def test_the_bent_energys_derivatives_are_those_of_its_values(bent):
     surface = Surface(vertices, triangles)
     uv = np.random.default_rng(1).random((len(vertices), 2))
     domain = Held(surface, Fixed(np.zeros(uv.shape, bool), uv))
-    energy = _Bent(domain, uv, np.ones(1), np.array([bent]), 1.0)
+    energy = _Bent(domain, uv, np.ones(1), np.array([bent]))
 
     def value(x):
         return energy.value(energy.jacobian(x.reshape(-1, 2)))[0]
