@@ -41,6 +41,7 @@ class Connected:
     joined : (e,) bool, the edges across which faces hang together
     outline : (v,) bool, the UV vertices at which the map ends
     set_aside : (f,) bool, the faces on top of others, with other UVs
+    single : (c,) bool, the corners of faces that lie on no other
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class Connected:
         apart = (uv[doubles.corners] != uv[doubles.twins]).any(axis=1)
         self.set_aside = np.zeros(len(face_start), bool)
         self.set_aside[self.corner_face[doubles.corners[apart]]] = True
-        self._single = single = ~doubles.among(len(face_start))[self.corner_face]
+        self.single = single = ~doubles.among(len(face_start))[self.corner_face]
         one, start, end, _ = across_edges(corner_vertex, corner_edge, following, nowhere, np.flatnonzero(single))
         joins = meet(uv, one, start, end, following)
         one, start, end = one[joins], start[joins], end[joins]
@@ -81,7 +82,7 @@ class Connected:
         beside, apart = self._at_vertices(in_selected), self._at_vertices(~in_selected)
         still = self._at_vertices(~self._selection.corners) | (beside & apart)
         still |= self._pinched | (self.outline & ~beside) if outline_moves else self.outline
-        return ~still[self.uv_vertex] & self._single
+        return ~still[self.uv_vertex] & self.single
 
     def spread(self, corners: np.ndarray) -> np.ndarray:
         """The chosen corners (c,) bool, and all that share a UV vertex with one of them, or lie on such."""
@@ -94,13 +95,13 @@ class Connected:
     def _at_vertices(self, corners):
         """Which UV vertices have any of the corners (c,) bool, (v,) bool; those of doubled faces do not count."""
         found = np.zeros(len(self.outline), bool)
-        found[self.uv_vertex[corners & self._single]] = True
+        found[self.uv_vertex[corners & self.single]] = True
         return found
 
     @property
     def _pinched(self):
         """The UV vertices, (v,) bool, where several fans of faces meet in one place: moved, they would part."""
-        corners = np.flatnonzero(self._single & self.outline[self.uv_vertex])
+        corners = np.flatnonzero(self.single & self.outline[self.uv_vertex])
         _, first = np.unique(self.uv_vertex[corners], return_index=True)
         fans = corners[first]
         places = np.column_stack([self._mesh[0][fans], self._uv[fans]])
@@ -117,15 +118,15 @@ class Connected:
 
     def whole_islands(self, faces: np.ndarray) -> np.ndarray:
         """The faces, (f,) bool, of all UV islands that have any of the chosen faces (f,) bool."""
-        corners = np.flatnonzero(self._single)
+        corners = np.flatnonzero(self.single)
         vertex, face = self.uv_vertex[corners], self.corner_face[corners]
         part = components(len(self.outline) + len(faces), vertex, len(self.outline) + face)[1][len(self.outline) :]
-        return np.isin(part, part[faces & self.faces_with(self._single)]) & self.faces_with(self._single)
+        return np.isin(part, part[faces & self.faces_with(self.single)]) & self.faces_with(self.single)
 
     def outline_sides(self) -> np.ndarray:
         """The sides of the outlines in the map, (k, 2) corners each."""
         _, following = around_faces(self._mesh[2], len(self.uv_vertex))
-        corners = np.flatnonzero(self._single & ~self.joined[self._mesh[1]])
+        corners = np.flatnonzero(self.single & ~self.joined[self._mesh[1]])
         return np.column_stack([corners, following[corners]])
 
     def islands(self, faces: np.ndarray, corner_triangles: np.ndarray) -> list[Island]:

@@ -78,7 +78,7 @@ def _measured(path, seed, largest):
             spoilt = _spoilt(mesh, connected, np.random.default_rng(seed))
             islands = connected.islands(everything.faces, mesh.corner_triangles)
             before = _energy(mesh, islands, spoilt)
-            held = ~connected.moving(False)
+            held = connected.single & ~connected.moving(False)
             if before is None or not (~held).any():
                 return None
         bpy.ops.object.mode_set(mode='OBJECT')
