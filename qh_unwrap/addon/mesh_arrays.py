@@ -146,6 +146,7 @@ def _read(obj, mesh, uv_name, options, vertex_group):
         welds = find_welds(_shapes(obj, unsmoothed), corner_vertex, corner_edge, face_start, len(seam))
         corner_vertex, corner_edge, welded_edge = welds.vertex[corner_vertex], welds.edge[corner_edge], welds.edge
         seam = (np.bincount(welded_edge, seam, len(seam)) > 0)[welded_edge]
+    importance = _importance(obj, mesh, options)
     return MeshArrays(
         vertices=vertices.astype(np.float64) @ shown.T,
         up=shown[:, 2] / (np.linalg.norm(shown[:, 2]) or 1.0),
@@ -161,19 +162,21 @@ def _read(obj, mesh, uv_name, options, vertex_group):
         images=images,
         pictures=pictures,
         welded_edge=welded_edge,
-        importance=_importance(obj, mesh, options),
-        wishes=None if vertex_group is None else _wishes(obj, mesh, vertex_group, corner_edge, face_start),
+        importance=importance,
+        wishes=None if vertex_group is None else _wishes(obj, mesh, vertex_group, corner_edge, face_start, importance),
     )
 
 
-def _wishes(obj, mesh, vertex_group, corner_edge, face_start):
-    """Sharp edges and borders of materials are marked, and the vertices of the group are spared by their weights."""
+def _wishes(obj, mesh, vertex_group, corner_edge, face_start, importance):
+    """Sharp edges and borders of materials are marked, the vertices of the group are spared by their weights, and seams
+    keep away from what is important."""
     marked = bulk.values(mesh.edges, "use_edge_sharp", bool)
     material = bulk.values(mesh.polygons, "material_index", np.int32)[around_faces(face_start, len(corner_edge))[0]]
     lowest, highest = np.full(len(marked), np.iinfo(np.int32).max), np.full(len(marked), -1)
     np.minimum.at(lowest, corner_edge, material)
     np.maximum.at(highest, corner_edge, material)
-    return Wishes(marked=marked | (lowest < highest), spared=_weights(obj, mesh, vertex_group))
+    important = None if importance is None else np.exp(importance)
+    return Wishes(marked | (lowest < highest), _weights(obj, mesh, vertex_group), importance=important)
 
 
 def _importance(obj, mesh, options):

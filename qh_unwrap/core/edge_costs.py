@@ -21,18 +21,22 @@ _SHORTEST = 1e-6  # of the root of the area, that every edge costs at least
 class Wishes:
     """Where seams are welcome on a mesh, and where not; each may be None.
 
-    marked  (e,) from 0 to 1 or bool: edges that seams like to follow, as sharp ones and borders of materials
-    spared  (n,) from 0 to 1: vertices that seams keep away from; an edge between two that have 1 is not cut
-    closed  (e,) bool: edges that are not cut
+    marked      (e,) from 0 to 1 or bool: edges that seams like to follow, as sharp ones and borders of materials
+    spared      (n,) from 0 to 1: vertices that seams keep away from; an edge between two that have 1 is not cut
+    closed      (e,) bool: edges that are not cut
+    importance  (n,) positive: how many times as large the surface is to be in the map around each vertex; a seam counts
+                as long as it will be there
     """
 
     marked: np.ndarray | None = None
     spared: np.ndarray | None = None
     closed: np.ndarray | None = None
+    importance: np.ndarray | None = None
 
     def check(self, vertices: int, edges: int) -> None:
         """Raise `ShapeError` where an array does not have as many values as the mesh has vertices or edges."""
-        for name, count in (("marked", edges), ("spared", vertices), ("closed", edges)):
+        counts = dict(marked=edges, spared=vertices, closed=edges, importance=vertices)
+        for name, count in counts.items():
             values = getattr(self, name)
             if values is not None and np.shape(values) != (count,):
                 raise ShapeError(f"{name} must have the shape ({count},), not {np.shape(values)}")
@@ -56,6 +60,8 @@ def edge_costs(mesh: Cuttable, settings: SeamSettings, wishes: Wishes) -> np.nda
         least, mean = spared[mesh.edges].min(axis=1), spared[mesh.edges].mean(axis=1)
         with np.errstate(divide="ignore"):
             cost /= np.where(least >= 1, 0, 1 - np.minimum(mean, 0.99))
+    if wishes.importance is not None:
+        cost *= np.sqrt(np.asarray(wishes.importance, dtype=float)[mesh.mesh_vertex][mesh.edges].mean(axis=1))
     if wishes.closed is not None:
         cost[mesh.of_mesh(np.asarray(wishes.closed, dtype=float)) > 0] = np.inf
     return np.where(mesh.inner, cost, np.inf)

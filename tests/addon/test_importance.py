@@ -8,7 +8,8 @@ from scenes import add_grid, edit_mode, uvs
 from test_check import put
 
 import qh_unwrap
-from qh_unwrap.addon import files
+from qh_unwrap.addon import files, mesh_arrays
+from qh_unwrap.addon.options import MeshOptions
 from qh_unwrap.cli import main
 
 
@@ -76,6 +77,23 @@ def test_objects_without_the_group_are_unwrapped_as_ever():
     with_group = uvs(plain)
     bpy.ops.uv.qh_unwrap()
     assert np.allclose(with_group, uvs(plain), atol=1e-5)
+
+
+def test_relax_gives_them_more_room_as_well():
+    obj = grouped()
+    bpy.ops.uv.qh_unwrap()
+    before = ratio(obj)
+    settings = bpy.context.scene.qh_unwrap
+    settings.use_weights, settings.weight_factor = True, 4.0
+    assert bpy.ops.uv.qh_relax(move_outline=True) == {'FINISHED'}
+    assert qh_unwrap.last_report()[0]["injective"]
+    assert before < 1.5 and 2.5 < ratio(obj) < 5
+
+
+def test_seams_know_of_them():
+    obj = grouped()
+    wishes = [mesh_arrays.read(obj, MeshOptions(use_weights=use), "").wishes for use in (True, False)]
+    assert sorted(set(wishes[0].importance.round(6))) == [1, 4] and wishes[1].importance is None
 
 
 def test_a_missing_group_is_told(tmp_path, capfd):

@@ -281,6 +281,19 @@ def test_vertices_that_are_spared_a_little_repel():
     assert repelled < usual
 
 
+def test_seams_keep_away_from_what_is_important():
+    mesh = ball()
+    importance = np.where(mesh.vertices[:, 2] > -0.1, 100.0, 1)
+    usual, repelled = (
+        (mesh.lengths * (mesh.vertices[mesh.ends, 2].mean(axis=1) > 0))[result_of(mesh, each).seams].sum()
+        for each in (None, Wishes(importance=importance))
+    )
+    assert repelled < usual
+    for factor in (1.0, 5.0):
+        alike = Wishes(importance=np.full(len(mesh.vertices), factor))
+        assert np.array_equal(result_of(mesh, alike).seams, result_of(mesh, None).seams)
+
+
 def test_where_nothing_may_be_cut_it_says_so():
     mesh = ball()
     (chart,) = cut_open(mesh, wishes=Wishes(closed=np.ones(len(mesh.seam), bool))).charts
