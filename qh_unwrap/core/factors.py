@@ -54,6 +54,8 @@ class superlu:  # noqa: N801 (it is called like a function, as a `Factorizer`)
         try:
             with np.errstate(over="ignore"):
                 matrix = self._matrix.astype(self._kind, copy=False)
+            if not np.isfinite(matrix.data).all():  # where SuperLU would read beyond its memory now and then
+                raise RuntimeError("the matrix is not finite")
             options = {"SymmetricMode": True}
             self._factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
         except RuntimeError:

@@ -7,6 +7,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from qh_unwrap.core import Surface, factors, systems, triangles
+from qh_unwrap.core.errors import SingularError
 from qh_unwrap.core.factors import superlu
 from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.systems import Constrained
@@ -268,3 +269,22 @@ def test_blocks_are_solved_whatever_their_size_in_single_precision(monkeypatch, 
     blocks = rows_of(scalar(-size * weight), scalar(size * np.diag(matrix)))
     solution = unconstrained(surface).newton_direction(-rhs, *blocks, 1e-6)
     assert np.linalg.norm(size * matrix @ solution - rhs) <= 1e-6 * np.linalg.norm(rhs)
+
+
+@pytest.mark.parametrize("single", [True, False])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_matrices_that_are_not_finite_are_not_factorized(value, single):
+    """SuperLU may crash on them, and all of Blender with it."""
+    surface = Surface(*shapes.grid(4, 4))
+    system = unconstrained(surface)
+    weights = np.ones((2, len(surface.edges)))
+    weights[:, 3] = value
+    matrix = system.patterns[0].matrix(-weights[0], -weights[1], system.diagonal(weights))
+    with pytest.raises(SingularError):
+        superlu(matrix, single)
+
+
+def test_what_single_precision_cannot_hold_is_factorized_in_double():
+    matrix = coo_array((np.array([1e200, 1.0]), (np.arange(2), np.arange(2))), shape=(2, 2)).tocsc()
+    solution = superlu(matrix, True).solve(np.array([[1e200], [2.0]]))
+    assert solution.ravel().tolist() == [1, 2]
