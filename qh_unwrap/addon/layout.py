@@ -25,7 +25,7 @@ def place(works, all_works, options, context):
             work.uv = placing.in_place(work.uv, work.triangles, old)
     texels.choose_scales(works, options, context)
     if options.placement != 'PACK':
-        _resize([work for work in works if options.placement == 'UNIT' or work.old_triangles is not None])
+        resize([work for work in works if options.placement == 'UNIT' or work.old_triangles is not None])
     if options.placement == 'UNIT':
         return
     new = [work for work in works if work.old_triangles is None]
@@ -41,7 +41,7 @@ def place(works, all_works, options, context):
         _move_beside(new, all_works)
 
 
-def _resize(works):
+def resize(works):
     """Give islands the scale that is chosen for them, around their middles."""
     works = [work for work in works if work.scale is not None]
     for work, factor in zip(works, texels.factors(works), strict=True):

@@ -11,10 +11,10 @@ from ..core.regions import Connected, Selection
 from ..core.relaxing import relax_islands, rim, straighten_islands
 from ..core.stepping import mapped
 from ..core.straightening import Polygons, rectangle, straight_lines
-from . import judging, mesh_arrays, modes, stacking, texels
+from . import judging, layout, mesh_arrays, modes, stacking, texels
 from .outcome import Outcome
 from .selection import Target
-from .unwrapping import are_as_read, keep, write
+from .unwrapping import are_as_read, keep, tell_of_density, write
 from .uv_selection import UVSelection
 from .work import Work
 
@@ -134,7 +134,7 @@ def _refused(obj, mesh, faces, error):
 
 def _carried_out(works, improved, settings, options, context):
     """Have the works `improved`, judge them and write them; yields the share that is done, returns their outcomes."""
-    yield from mapped(lambda share: _RELAXING * share, improved(works, settings))
+    yield from mapped(lambda share: _RELAXING * share, improved(works, settings, options, context))
     placed = [work for work in works if work.uv is not None]
     if placed and are_as_read(works):
         judging.keep_what_was_valid(placed)
@@ -151,21 +151,28 @@ def _carried_out(works, improved, settings, options, context):
     return [work.outcome for work in works]
 
 
-def _relaxed(works, settings):
+def _relaxed(works, settings, options, context):
     """Relax the works; those that run over others keep their outlines.  Yields the share that is done."""
     tried = [work for work in works if not work.outcome.error and _can_be_read(work, settings)]
     outlines = _Outlines(works) if settings.move_outline else None
     yield from _taken(tried, relax_islands([_shape(work, outlines) for work in tried], settings))
     if not settings.move_outline:
+        tell_of_density(tried, options)
         return
+    whole = [work for work in tried if work.uv is not None and work.moving.all()]
+    if options.texel_density == 'GIVEN':  # else they keep theirs
+        texels.choose_scales(whole, options, context)
+        layout.resize(whole)
     bold = yield from _running_over(tried, works)
     for work in bold:
+        work.scale = None
         work.moving[np.concatenate(work.loops)] = False
     held = dataclasses.replace(settings, move_outline=False)
     yield from _taken(bold, relax_islands([_shape(work) for work in bold], held))
     for work in bold:
         if work.moving.any():
             work.outcome.warnings += (STAYS,)
+    tell_of_density(tried, options)
 
 
 def _can_be_read(work, settings):
@@ -222,7 +229,7 @@ def _running_over(works, all_works):
     return [work for work, others in zip(placed, found, strict=False) if others]
 
 
-def _straightened(works, settings):
+def _straightened(works, settings, _options, _context):
     """Straighten the works; yields the share that is done."""
     tried = [work for work in works if not work.outcome.error]
     shapes, outlines = [], _Outlines(works) if settings.move_outline else None

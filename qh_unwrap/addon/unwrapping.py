@@ -73,7 +73,7 @@ def _placed(works, options, context):
     yield _UNWRAPPING
     layout.place([work for work in works if work.uv is not None], works, options, context)
     yield _UNWRAPPING
-    _tell_of_density(works, options)
+    tell_of_density(works, options)
     placed = [work for work in works if work.uv is not None]
     judging.judge(placed)
     yield from mapped(lambda _: _UNWRAPPING, hint_at_seams(placed))
@@ -83,11 +83,11 @@ def _placed(works, options, context):
     return placed
 
 
-def _tell_of_density(works, options):
+def tell_of_density(works, options):
     """Warn of islands that cannot get the texel density that is given, since something of them is held."""
     if options.texel_density == 'GIVEN':
         for work in works:
-            if work.in_frame and work.uv is not None:
+            if work.in_frame and work.uv is not None and work.scale is None:
                 work.outcome.warnings += ("its texel density stays, since pins or its outline hold it",)
 
 

@@ -108,3 +108,18 @@ def test_as_placed_is_as_it_was():
     expected = uvs(obj)
     bpy.ops.uv.qh_unwrap(placement='PACK', pixels_per_metre=3, image_size=7)
     assert np.allclose(uvs(obj), expected, atol=1e-5)
+
+
+def test_relaxed_islands_get_it_where_their_outlines_may_move():
+    obj = add_grid(6)
+    image(obj, 1024, 512)
+    settings = bpy.context.scene.qh_unwrap
+    settings.texel_density, settings.pixels_per_metre = 'GIVEN', 200
+    before = uvs(obj)
+    bpy.ops.uv.qh_relax()
+    (island,) = qh_unwrap.last_report()
+    assert any("its texel density stays" in text for text in island["warnings"]) and island["texel_density"] > 300
+    bpy.ops.uv.qh_relax(move_outline=True)
+    (island,) = qh_unwrap.last_report()
+    assert island["texel_density"] == pytest.approx(200, rel=1e-4) and not island["warnings"]
+    assert uvs(obj).mean(axis=0) == pytest.approx(before.mean(axis=0), abs=0.05)
