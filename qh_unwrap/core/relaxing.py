@@ -70,8 +70,14 @@ def straighten_islands(
     made = Settings(balance=settings.balance, refine=settings.steps)
     tasks: list[_Task | UnwrapError] = []
     for shape in shapes:
-        flips = _flips(shape.triangles, shape.start)
-        tasks.append(UVError(f"{_counted(flips)}: relax it first") if flips else _Task(made, shape))
+        flips, flat = _flips(shape.triangles, shape.start), _flattened(shape)
+        if flips:
+            tasks.append(UVError(f"{_counted(flips)}: relax it first"))
+        elif flat:
+            faces = "triangle would" if flat == 1 else "triangles would"
+            tasks.append(UVError(f"{flat} of its {faces} become flat, with all corners on one line: select less"))
+        else:
+            tasks.append(_Task(made, shape))
     results = yield from _unwrapped(tasks, triangulate)
     return [
         UVError(f"{CANNOT} that is straight there: select less, or unpin some") if _has_flips(result) else result
@@ -86,6 +92,12 @@ class _Task(NamedTuple):
     shape: Shape
     mirrored: bool = False  # beforehand, since nothing holds it
     is_loose: bool = False  # nothing holds it, so that it is to be put back in its place
+
+
+def _flattened(shape):
+    """How many triangles have all their corners on a line along U or V where the shape is pinned."""
+    pinned, uv = np.asarray(shape.pinned)[shape.triangles], np.asarray(shape.uv)[shape.triangles]
+    return int((pinned.all(axis=1) & (uv == uv[:, :1]).all(axis=1)).any(axis=1).sum())
 
 
 def _has_flips(result):

@@ -154,6 +154,15 @@ def test_two_rows_are_two_lines_and_parallel_ones_that_meet_are_one():
     assert len(np.unique(together.values[together.held[:, 1], 1])) == 1, "they cross, so they are one line"
 
 
+def test_lines_that_would_flatten_a_triangle_are_an_error():
+    vertices, triangles, uv, polygons = quads()
+    around = np.isin(polygons.face, [27])
+    straight = straight_lines(polygons, vertices, uv, around, np.zeros(uv.shape, bool), along="U")
+    shape = Shape(vertices, triangles, straight.values, straight.held, start=uv)
+    (result,) = finished(straighten_islands([shape]))
+    assert isinstance(result, errors.UVError) and "2 of its triangles would become flat" in str(result)
+
+
 def test_a_closed_loop_cannot_be_straight():
     vertices, _, uv, polygons = quads()
     square = {30, 31, 32, 41, 50, 49, 48, 39}
