@@ -95,7 +95,7 @@ def _run(args, record, progress):
     targets = [selection.Target(obj, faces(obj.data)) for obj in objects]
     targets = choice.narrowed(targets, args.material)
     objects = choice.required()
-    problem = options.use_weights and not args.check and selection.without_group(targets, options.weight_group)
+    problem = options.use_weights and not args.check and selection.without_group(objects, options.weight_group)
     if problem:
         raise UsageError(problem)
     maps.make_missing(objects)

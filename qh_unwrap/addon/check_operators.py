@@ -6,11 +6,11 @@ import numpy as np
 
 from . import inspecting, selecting, selection, telling
 from .last_run import last_run
+from .operators import OnMeshes
 from .report_operators import face_count
-from .running import InSteps
 
 
-class QH_OT_check(InSteps, bpy.types.Operator):
+class QH_OT_check(OnMeshes, bpy.types.Operator):
     """Say how these UVs distort, and what is flipped, overlaps, has no area or lies outside of its tile"""
 
     bl_idname = "uv.qh_check"
@@ -23,15 +23,6 @@ class QH_OT_check(InSteps, bpy.types.Operator):
         default=False,
         options={'SKIP_SAVE'},
     )
-
-    @classmethod
-    def poll(cls, context):
-        if selection.mesh_objects(context):
-            return True
-        cls.poll_message_set(
-            "Needs a mesh in Edit Mode or selected meshes in Object Mode, not linked from another file"
-        )
-        return False
 
     def begin(self, context):
         if self.only_selected and context.mode == 'EDIT_MESH':

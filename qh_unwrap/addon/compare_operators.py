@@ -6,8 +6,7 @@ from pathlib import Path
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
-from ..core.errors import SettingsError
-from . import comparing, plotting, selection, writing
+from . import comparing, plotting, writing
 from .comparison import HEAD, latest
 from .failures import FileError
 from .operators import OnSelectedFaces
@@ -34,21 +33,10 @@ class _Comparing(OnSelectedFaces):
     )
 
     def begin(self, context):
-        targets = selection.targets(context)
-        if not targets:
-            self.report({'ERROR'}, selection.nothing_selected(context))
+        asked = self.asked_for(context, context.scene.qh_unwrap)
+        if asked is None:
             return None
-        its = context.scene.qh_unwrap
-        try:
-            settings, options = its.settings(), its.mesh_options()
-            settings.check_together()
-        except SettingsError as error:
-            self.report({'ERROR'}, str(error))
-            return None
-        problem = options.use_weights and selection.without_group(targets, options.weight_group)
-        if problem:
-            self.report({'ERROR'}, problem)
-            return None
+        targets, settings, options = asked
         blenders = self.methods == 'BLENDER'
         methods = comparing.blenders(settings, options) if blenders else comparing.of_figure_11(options)
         return comparing.compare(targets, methods, context, options)

@@ -110,7 +110,7 @@ heatmap = Heatmap()
 
 def settings_of(scene):
     """The `HeatSettings` that the panel shows."""
-    return scene.qh_heatmap.heat_settings() if scene else HeatSettings()
+    return scene.qh_heatmap.settings() if scene else HeatSettings()
 
 
 def redraw():

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What Blender's meshes need beside the core's `Settings`, written down once like those; needs no Blender."""
 
-import dataclasses
 from dataclasses import dataclass
 
-from ..core.settings import Choice, check, setting
+from ..core.settings import Choice, check_all, setting
 
 _PLACEMENT = (
     Choice(
@@ -113,7 +112,7 @@ class MeshOptions:
     )
 
     def __post_init__(self):
-        _check(self)
+        check_all(self)
 
 
 @dataclass(frozen=True)
@@ -127,7 +126,7 @@ class SeamOptions:
     unwrap: bool = setting(True, "Unwrap", "Unwrap the faces as well, with the settings of Quasi-Harmonic Unwrap")
 
     def __post_init__(self):
-        _check(self)
+        check_all(self)
 
 
 _QUANTITY = (
@@ -161,9 +160,4 @@ class HeatSettings:
     )
 
     def __post_init__(self):
-        _check(self)
-
-
-def _check(owner):
-    for field in dataclasses.fields(owner):
-        check(field, getattr(owner, field.name))
+        check_all(self)

@@ -213,41 +213,14 @@ class QH_PT_view_3d(_Panel, bpy.types.Panel):
     bl_space_type = 'VIEW_3D'
 
 
-class QH_PT_uv_editor_seams(_SeamPanel, bpy.types.Panel):
-    bl_space_type = 'IMAGE_EDITOR'
-    bl_parent_id = "QH_PT_uv_editor"
+def _in_both(name, section):
+    """The classes of a section below the panels of the UV Editor and of the 3D View."""
+    for place, space in (("uv_editor", 'IMAGE_EDITOR'), ("view_3d", 'VIEW_3D')):
+        its = dict(bl_space_type=space, bl_parent_id=f"QH_PT_{place}")
+        yield type(f"QH_PT_{place}_{name}", (section, bpy.types.Panel), its)
 
 
-class QH_PT_view_3d_seams(_SeamPanel, bpy.types.Panel):
-    bl_space_type = 'VIEW_3D'
-    bl_parent_id = "QH_PT_view_3d"
-
-
-class QH_PT_uv_editor_relax(_RelaxPanel, bpy.types.Panel):
-    bl_space_type = 'IMAGE_EDITOR'
-    bl_parent_id = "QH_PT_uv_editor"
-
-
-class QH_PT_view_3d_relax(_RelaxPanel, bpy.types.Panel):
-    bl_space_type = 'VIEW_3D'
-    bl_parent_id = "QH_PT_view_3d"
-
-
-class QH_PT_uv_editor_distortion(_DistortionPanel, bpy.types.Panel):
-    bl_space_type = 'IMAGE_EDITOR'
-    bl_parent_id = "QH_PT_uv_editor"
-
-
-class QH_PT_view_3d_distortion(_DistortionPanel, bpy.types.Panel):
-    bl_space_type = 'VIEW_3D'
-    bl_parent_id = "QH_PT_view_3d"
-
-
-class QH_PT_uv_editor_report(_ReportPanel, bpy.types.Panel):
-    bl_space_type = 'IMAGE_EDITOR'
-    bl_parent_id = "QH_PT_uv_editor"
-
-
-class QH_PT_view_3d_report(_ReportPanel, bpy.types.Panel):
-    bl_space_type = 'VIEW_3D'
-    bl_parent_id = "QH_PT_view_3d"
+QH_PT_uv_editor_seams, QH_PT_view_3d_seams = _in_both("seams", _SeamPanel)
+QH_PT_uv_editor_relax, QH_PT_view_3d_relax = _in_both("relax", _RelaxPanel)
+QH_PT_uv_editor_distortion, QH_PT_view_3d_distortion = _in_both("distortion", _DistortionPanel)
+QH_PT_uv_editor_report, QH_PT_view_3d_report = _in_both("report", _ReportPanel)

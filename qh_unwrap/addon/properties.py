@@ -45,12 +45,12 @@ def _value(value):
 class _Properties:
     """Mix-in with one property per field of the `kinds` of dataclasses."""
 
-    fields = ()
+    kinds, fields = (), ()
 
     def __init_subclass__(cls, *, kinds=(), options=frozenset(), **others):
         super().__init_subclass__(**others)
         if kinds:
-            cls.fields = _fields(*kinds)
+            cls.kinds, cls.fields = kinds, _fields(*kinds)
             cls.__annotations__ = {field.name: _property(field, options) for field in cls.fields}
 
     def as_keywords(self):
@@ -96,37 +96,30 @@ class SeamOperatorProperties(_Cutting, kinds=(SeamOptions, SeamSettings), option
     """The same for an operator, which forgets them after each run."""
 
 
-class _Relaxing(_Properties):
+class _OfOneKind(_Properties):
     def settings(self):
-        return _made_from(self, RelaxSettings)
+        (kind,) = self.kinds
+        return _made_from(self, kind)
 
 
-class RelaxProperties(_Relaxing, kinds=(RelaxSettings,)):
+class RelaxProperties(_OfOneKind, kinds=(RelaxSettings,)):
     """How to relax."""
 
 
-class RelaxOperatorProperties(_Relaxing, kinds=(RelaxSettings,), options={'SKIP_SAVE'}):
+class RelaxOperatorProperties(_OfOneKind, kinds=(RelaxSettings,), options={'SKIP_SAVE'}):
     """The same for an operator, which forgets them after each run."""
 
 
-class _Straightening(_Properties):
-    def settings(self):
-        return _made_from(self, StraightenSettings)
-
-
-class StraightenProperties(_Straightening, kinds=(StraightenSettings,)):
+class StraightenProperties(_OfOneKind, kinds=(StraightenSettings,)):
     """How to straighten."""
 
 
-class StraightenOperatorProperties(_Straightening, kinds=(StraightenSettings,), options={'SKIP_SAVE'}):
+class StraightenOperatorProperties(_OfOneKind, kinds=(StraightenSettings,), options={'SKIP_SAVE'}):
     """The same for an operator, which forgets them after each run."""
 
 
-class HeatProperties(_Properties, kinds=(HeatSettings,)):
+class HeatProperties(_OfOneKind, kinds=(HeatSettings,)):
     """What the heatmap shows."""
-
-    def heat_settings(self):
-        return _made_from(self, HeatSettings)
 
 
 _FIRST = ('boundary', 'aspect', 'balance', 'iterations', 'weights')

@@ -31,11 +31,7 @@ def relax(chosen, settings, options, context):
     A generator: yields the share that is done, returns the outcomes of the regions that were selected; there are none
     where nothing is selected.  Nothing is written before all are done.
     """
-    works = []
-    for obj, selected in chosen:
-        yield 0.0
-        works += _regions(obj, selected, settings, options)
-    return (yield from _carried_out(works, _relaxed, settings, options, context))
+    return (yield from _carried_out(chosen, _regions, _relaxed, settings, options, context))
 
 
 def straighten(chosen, settings, options, context):
@@ -43,11 +39,7 @@ def straighten(chosen, settings, options, context):
 
     A generator like `relax`; the outcomes are those of whole islands.
     """
-    works = []
-    for obj, selected in chosen:
-        yield 0.0
-        works += _straight(obj, selected, settings, options)
-    return (yield from _carried_out(works, _straightened, settings, options, context))
+    return (yield from _carried_out(chosen, _straight, _straightened, settings, options, context))
 
 
 def _regions(obj, selected, settings, options):
@@ -132,8 +124,13 @@ def _refused(obj, mesh, faces, error):
     return Work(Target(obj, faces), mesh, None, outcome, Settings(), None)
 
 
-def _carried_out(works, improved, settings, options, context):
-    """Have the works `improved`, judge them and write them; yields the share that is done, returns their outcomes."""
+def _carried_out(chosen, parted, improved, settings, options, context):
+    """Have what is chosen `parted` into works and these `improved`, judge them and write them; yields the share that is
+    done, returns their outcomes."""
+    works = []
+    for obj, selected in chosen:
+        yield 0.0
+        works += parted(obj, selected, settings, options)
     yield from mapped(lambda share: _RELAXING * share, improved(works, settings, options, context))
     placed = [work for work in works if work.uv is not None]
     if placed and are_as_read(works):
@@ -165,7 +162,7 @@ def _relaxed(works, settings, options, context):
         layout.resize(whole)
     bold = yield from _running_over(tried, works)
     for work in bold:
-        work.scale = None
+        work.scale, work.outcome.warnings = None, ()  # what there is to say of it is said anew
         work.moving[np.concatenate(work.loops)] = False
     held = dataclasses.replace(settings, move_outline=False)
     yield from _taken(bold, relax_islands([_shape(work) for work in bold], held))

@@ -74,9 +74,9 @@ def visible_faces(mesh):
     return ~hidden
 
 
-def without_group(targets, name):
-    """Why none of the targets has the vertex group, and the cure; nothing if one has it."""
-    if any(target.obj.vertex_groups.get(name) for target in targets):
+def without_group(objects, name):
+    """Why none of the objects has the vertex group, and the cure; nothing if one has it."""
+    if any(obj.vertex_groups.get(name) for obj in objects):
         return ""
     return f"There is no vertex group {name}: paint one, choose another, or turn the importance weights off"
 

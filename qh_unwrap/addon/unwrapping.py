@@ -8,11 +8,12 @@ from collections.abc import Generator, Sequence
 import bpy
 import numpy as np
 
-from ..core import Settings, Shape, UnwrapError, unwrap_islands
+from ..core import Settings, Shape, UnwrapError
 from ..core.course import PINS_CROSS
 from ..core.errors import BoundaryError, ClosedError, GenusError, UVError
 from ..core.islands import attached, find_islands
 from ..core.stepping import mapped
+from ..core.unwrapping import unwrap_variously
 from . import judging, layout, mesh_arrays, modes, stacking, texels
 from .hints import hint_at_seams
 from .options import MeshOptions
@@ -117,28 +118,23 @@ def _take(cut, work):
 
 
 def _unwrap(works):
-    """Unwrap the islands, all of the same settings at once; yields the share that is done."""
-    shapes: dict[Settings, list[tuple[Work, Shape]]] = {}
+    """Unwrap the islands, each with its settings; yields the share that is done."""
+    asked, tried = [], []
     for work in works:
         try:
-            settings, shape = _shape(work)
-            shapes.setdefault(settings, []).append((work, shape))
+            asked.append(_shape(work))
+            tried.append(work)
         except UnwrapError as error:
             work.outcome.error = str(error)
-    done = 0
-    for settings, group in shapes.items():
-        steps = unwrap_islands([shape for _, shape in group], settings)
-        first, its = done / len(works), len(group) / len(works)
-        results = yield from mapped(lambda share, first=first, its=its: first + its * share, steps)
-        done += len(group)
-        for (work, _), result in zip(group, results, strict=True):
-            if isinstance(result, UnwrapError):
-                work.outcome.error = _explained(result, work)
-                work.outcome.needs_cut = isinstance(result, ClosedError | GenusError)
-                if work.cut_fault and work.outcome.needs_cut:
-                    work.outcome.error = work.cut_fault
-            else:
-                keep(work, result)
+    results = yield from unwrap_variously(asked)
+    for work, result in zip(tried, results, strict=True):
+        if isinstance(result, UnwrapError):
+            work.outcome.error = _explained(result, work)
+            work.outcome.needs_cut = isinstance(result, ClosedError | GenusError)
+            if work.cut_fault and work.outcome.needs_cut:
+                work.outcome.error = work.cut_fault
+        else:
+            keep(work, result)
 
 
 def _shape(work):

@@ -59,6 +59,11 @@ class Batch:
         return np.array([walls is not None for walls in self.walls])
 
     @property
+    def has_hold(self) -> np.ndarray:
+        """(p,) bool, whether anything says where the piece lies."""
+        return self.has_pins | self.has_partners | self.has_walls
+
+    @property
     def fixed(self) -> Fixed:
         """What pins and partners fix."""
         return Fixed(self.pinned, self.uv, self.partner)
@@ -67,8 +72,7 @@ class Batch:
         """(p,) bool, whether the old UVs hold the new ones."""
         if settings.boundary == "KEEP":
             return self.has_uv
-        held = self.has_pins | self.has_partners | self.has_walls
-        return self.has_uv & held & (settings.boundary == "FREE")
+        return self.has_uv & self.has_hold & (settings.boundary == "FREE")
 
     def apart(self, uv: np.ndarray) -> np.ndarray:
         """In which pieces (p,) bool of the map `uv` (n, 2) pins are elsewhere than they are to be."""

@@ -196,8 +196,7 @@ class Course(Improvement):
             if (value < _NEAR).any():
                 certified = certified_pieces(surface, start) if certified is None else certified
                 done = certified & (value <= ISOMETRIC) & ~batch.apart(start)
-                near = certified & (value < _NEAR) & ~done & directly
-                near &= ~(batch.has_pins | batch.has_partners | batch.has_walls)
+                near = certified & (value < _NEAR) & ~done & ~batch.has_hold & directly
         self.converged |= done
         if (done | near).any():
             yield STEP

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every setting of relaxing and of straightening: name, default, range and description, written down once."""
 
-import dataclasses
 from dataclasses import dataclass
 
-from .settings import Choice, Settings, check, setting, setting_of
+from .settings import Choice, Settings, check_all, setting, setting_of
 
 _DIRECTIONS = (
     Choice("BOTH", "U and V", "UVs move in any direction"),
@@ -55,8 +54,7 @@ class RelaxSettings:
     )
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            check(field, getattr(self, field.name))
+        check_all(self)
 
 
 @dataclass(frozen=True)
@@ -75,5 +73,4 @@ class StraightenSettings:
     steps: int = _steps(30)
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            check(field, getattr(self, field.name))
+        check_all(self)

@@ -20,9 +20,8 @@ from .placing import in_place, is_mirrored, says_where
 from .relax_settings import RelaxSettings, StraightenSettings
 from .report import Result, Shape
 from .settings import Settings
-from .stepping import mapped
 from .triangles import corners_of
-from .unwrapping import unwrap_islands
+from .unwrapping import unwrap_variously
 
 _HALVINGS = 4  # of the way from a blend that is not valid to the relaxed map, which is
 CANNOT = "no map of it without flips was found"
@@ -146,21 +145,10 @@ def _counted(flips):
 
 
 def _unwrapped(tasks, triangulate):
-    """Carry the tasks out, all of the same settings at once; yields the share that is done, returns the results."""
-    results: list[Result | UnwrapError | None] = [task if isinstance(task, UnwrapError) else None for task in tasks]
-    groups: dict[Settings, list[int]] = {}
-    for k, task in enumerate(tasks):
-        if isinstance(task, _Task):
-            groups.setdefault(task.settings, []).append(k)
-    done = 0
-    for settings, group in groups.items():
-        first, part = done / len(tasks), len(group) / len(tasks)
-        steps = unwrap_islands([tasks[k].shape for k in group], settings, triangulate)
-        found = yield from mapped(lambda share, first=first, part=part: first + part * share, steps)
-        done += len(group)
-        for k, result in zip(group, found, strict=True):
-            results[k] = _explained(result)
-    return results
+    """Carry out those tasks that are no errors; yields the share that is done, returns the results of all."""
+    asked = [(task.settings, task.shape) for task in tasks if isinstance(task, _Task)]
+    results = iter((yield from unwrap_variously(asked, triangulate)))
+    return [_explained(next(results)) if isinstance(task, _Task) else task for task in tasks]
 
 
 def _explained(result):

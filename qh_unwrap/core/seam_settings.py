@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every setting of the search for seams: name, default, range and description, written down once."""
 
-import dataclasses
 from dataclasses import dataclass
 
-from .settings import Choice, check, setting
+from .settings import Choice, check_all, setting
 
 _AXES = (
     Choice("NONE", "None", "Seams need not be symmetric"),
@@ -69,5 +68,4 @@ class SeamSettings:
     )
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            check(field, getattr(self, field.name))
+        check_all(self)

@@ -136,8 +136,7 @@ class Settings:
     )
 
     def __post_init__(self) -> None:
-        for field in dataclasses.fields(self):
-            check(field, getattr(self, field.name))
+        check_all(self)
 
     def check_together(self) -> None:
         """Raise `SettingsError` where settings exclude each other."""
@@ -161,6 +160,13 @@ _EXCLUDED: tuple[tuple[Callable[[Settings], bool], str], ...] = (
         "a free boundary needs the weights COTANGENT, not {0.weights}: change them, or choose the boundary CIRCLE",
     ),
 )
+
+
+def check_all(settings: Any) -> None:
+    """Raise `SettingsError` if a field of these settings, a dataclass of fields made by `setting`, has a value that it
+    cannot have."""
+    for field in dataclasses.fields(settings):
+        check(field, getattr(settings, field.name))
 
 
 def check(field: dataclasses.Field, value: Any) -> None:

@@ -123,6 +123,25 @@ def _unwrapped(shapes, settings, triangulate):
     return [found[k] for k in range(len(shapes))]
 
 
+def unwrap_variously(
+    asked: Sequence[tuple[Settings, Shape]], triangulate: Triangulator | None = None
+) -> Generator[float, None, list[Result | UnwrapError]]:
+    """The same of islands with settings of their own; all of the same settings go together."""
+    found: dict[int, Result | UnwrapError] = {}
+    groups: dict[Settings, list[int]] = {}
+    for k, (settings, _) in enumerate(asked):
+        groups.setdefault(settings, []).append(k)
+    for settings, group in groups.items():
+
+        def overall(share: float, before: int = len(found), its: int = len(group)) -> float:
+            return (before + its * share) / len(asked)
+
+        steps = unwrap_islands([asked[k][1] for k in group], settings, triangulate)
+        results = yield from mapped(overall, steps)
+        found.update(zip(group, results, strict=True))
+    return [found[k] for k in range(len(asked))]
+
+
 def _portions(shapes):
     """Which shapes go together, lists of their numbers: the small ones, and every large one on its own."""
     portions, together, size = [], [], 0

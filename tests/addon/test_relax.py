@@ -271,17 +271,30 @@ def test_an_outline_that_moves_keeps_off_other_islands():
     assert new[:64, 1].max() < 0.21 and new[:64, 1].min() > -0.01
 
 
+# Islands that cross each other, and so are no walls
+CROSSING = (-0.5, 0.21, 1.5, 0.9), (0.1, 0.21, 0.9, 1.5), (-0.5, -0.9, 1.5, -0.01), (0.1, -1.5, 0.9, -0.01)
+
+
 def test_an_outline_stays_where_others_are_no_wall():
-    """Islands that cross each other are none: what comes to lie on them is relaxed within its outline."""
-    obj = with_neighbours(
-        (-0.5, 0.21, 1.5, 0.9), (0.1, 0.21, 0.9, 1.5), (-0.5, -0.9, 1.5, -0.01), (0.1, -1.5, 0.9, -0.01)
-    )
+    """What comes to lie on them is relaxed within its outline."""
+    obj = with_neighbours(*CROSSING)
     old = uvs(obj)
     assert relax(move_outline=True) == {'FINISHED'}
     (outcome,) = operators.last_outcomes
     assert not outcome.overlaps and any("would run over other islands" in text for text in outcome.warnings)
     new = uvs(obj)
     assert np.array_equal(old[64:], new[64:]) and moved(old, new).any()
+
+
+def test_what_is_relaxed_once_more_is_told_once():
+    obj = with_neighbours(*CROSSING)
+    bm = bmesh.from_edit_mesh(obj.data)
+    bm.faces.ensure_lookup_table()
+    bm.faces[5].normal_flip()
+    bmesh.update_edit_mesh(obj.data)
+    assert relax(move_outline=True) == {'FINISHED'}
+    warnings = operators.last_outcomes[0].warnings
+    assert len(warnings) == 2 and sum("inside out" in text for text in warnings) == 1
 
 
 def tangle(obj, how):
@@ -387,6 +400,16 @@ def test_a_pin_of_a_doubled_face_holds_what_it_lies_on():
     old = uvs(obj)
     assert relax() == {'FINISHED'}
     assert at_vertices(obj, moved(old, uvs(obj))) == {6, 9, 10}
+
+
+@pytest.mark.parametrize("name", ["qh_relax", "qh_straighten", "qh_seams"])
+def test_a_missing_group_of_importance_is_told(name):
+    obj = spoilt_grid()
+    bpy.context.scene.qh_unwrap.use_weights = True
+    before = snapshot(obj)
+    with pytest.raises(RuntimeError, match="There is no vertex group uv_importance"):
+        getattr(bpy.ops.uv, name)()
+    assert not changes(before, snapshot(obj))
 
 
 def test_no_uv_map_says_so():

@@ -68,7 +68,7 @@ class Context:
         return getattr(bpy.context, name)
 
 
-class Unwrapping(InSteps):
+class Unwrapping(operators.OnSelectedFaces):
     """The operator, as far as it runs without Blender's own part of it."""
 
     begin, finish = operators.QH_OT_unwrap.begin, operators.QH_OT_unwrap.finish
@@ -343,7 +343,7 @@ def test_exception_beside_the_islands_leaves_nothing_behind(slow, monkeypatch, s
         yield 0.5
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr(unwrapping, "unwrap_islands", broken)
+    monkeypatch.setattr(unwrapping, "unwrap_variously", broken)
     if start == "execute":
         operator, context = Unwrapping(), Context()
         with pytest.raises(ZeroDivisionError):

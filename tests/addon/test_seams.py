@@ -220,7 +220,7 @@ def test_what_cannot_be_unwrapped_is_not_cut(monkeypatch):
         yield 0.0
         return [qh_unwrap.core.UnwrapError("it is tired") for _ in shapes]
 
-    monkeypatch.setattr(unwrapping, "unwrap_islands", fail)
+    monkeypatch.setattr(unwrapping, "unwrap_variously", fail)
     with pytest.raises(RuntimeError, match="is tired"):
         bpy.ops.uv.qh_unwrap(cut='NEEDED')
     assert not seams(cube).any()

@@ -16,7 +16,7 @@ def steps(gui):
     gui.workspace("UV Editing")
     yield 1
     _add(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
-    _show_checker(gui)
+    show_checker(gui)
     bpy.ops.ed.undo_push(message="Checker")
     yield 2
     yield from _menus(gui)
@@ -31,13 +31,13 @@ def steps(gui):
 
 
 def _menus(gui):
-    before = _uvs()
+    before = uvs()
     yield from _open_menu(gui, 'VIEW_3D')
     gui.shot("1_menu_view_3d.png")
     gui.key("q")
     yield 2
     yield from _end(gui)
-    assert not np.array_equal(_uvs(), before), "the menu entry did nothing"
+    assert not np.array_equal(uvs(), before), "the menu entry did nothing"
     gui.shot("2_report.png")
     yield from _redo(gui, "3_redo_panel.png")
 
@@ -57,7 +57,7 @@ def _menus(gui):
 
 def _redo(gui, shot):
     """Open the redo panel, turn the boundary to Circle and back with the wheel, and close it."""
-    before = _uvs()
+    before = uvs()
     gui.click(*gui.xy(gui.region(gui.area('VIEW_3D'), "HUD"), 0.3, 0.5))
     yield 3
     gui.shot(shot)
@@ -67,10 +67,10 @@ def _redo(gui, shot):
         gui.xdo("keydown", "ctrl", "click", wheel, "keyup", "ctrl")
         yield 3
         for _ in range(60):  # on a busy machine it takes longer
-            if np.allclose(_uvs(), before, atol=1e-4) != changes:
+            if np.allclose(uvs(), before, atol=1e-4) != changes:
                 break
             yield 0.5
-        assert np.allclose(_uvs(), before, atol=1e-4) != changes, "the redo panel did nothing, or did not come back"
+        assert np.allclose(uvs(), before, atol=1e-4) != changes, "the redo panel did nothing, or did not come back"
         if changes:
             gui.shot(shot.replace(".", "_changed."))
     gui.click(*gui.xy(gui.region(gui.area('VIEW_3D'), "HUD"), 0.3, 0.04))
@@ -92,7 +92,7 @@ def _sidebars(gui):
     gui.shot("8_sidebars_with_all_sections.png")
 
     bpy.context.scene.qh_unwrap.placement = 'PACK'
-    before = _uvs()
+    before = uvs()
     gui.click(*_button(gui, 'IMAGE_EDITOR', _BUTTONS["Unwrap"]))
     yield 2
     yield from _end(gui)
@@ -108,11 +108,11 @@ def _sidebars(gui):
     yield from _end(gui)
     yield 1
     gui.shot("10_packed_by_the_button.png")
-    assert not np.array_equal(_uvs(), before), "the button did nothing"
-    assert _uvs().min() >= 0 and _uvs().max() <= 1, "not packed: ESC, pressed before, stops Blender's packer"
+    assert not np.array_equal(uvs(), before), "the button did nothing"
+    assert uvs().min() >= 0 and uvs().max() <= 1, "not packed: ESC, pressed before, stops Blender's packer"
     gui.key("ctrl+z")
     yield 2
-    assert np.array_equal(_uvs(), before), "undo did not restore"
+    assert np.array_equal(uvs(), before), "undo did not restore"
     bpy.context.scene.qh_unwrap.placement = 'ORIGINAL'
 
 
@@ -190,12 +190,12 @@ def _check(gui):
     with gui.override('VIEW_3D'):
         bpy.ops.uv.smart_project(angle_limit=1.2)
     yield 1
-    before = _uvs()
+    before = uvs()
     gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Check"]))
     yield 2
     yield from _end(gui)
     gui.shot("22_checked.png")
-    assert np.array_equal(_uvs(), before), "the check changed something"
+    assert np.array_equal(uvs(), before), "the check changed something"
     for sync in (True, False):
         bpy.context.scene.tool_settings.use_uv_select_sync = sync
         with gui.override('VIEW_3D'):
@@ -240,7 +240,7 @@ def _heatmap(gui):
 
 def _compare(gui):
     """A table of what methods make of copies, and a plot in the Image Editor that there is."""
-    before = _uvs()
+    before = uvs()
     gui.move('VIEW_3D', fx=0.4, fy=0.5)
     with gui.override('VIEW_3D'):
         bpy.ops.uv.qh_compare('INVOKE_DEFAULT')
@@ -262,7 +262,7 @@ def _compare(gui):
     assert editor.spaces.active.image == bpy.data.images["QH Unwrap Distortion"]
     editor.ui_type = 'UV'
     yield 1
-    assert np.array_equal(_uvs(), before), "the comparison changed something"
+    assert np.array_equal(uvs(), before), "the comparison changed something"
 
 
 def _troubled(calc_uvs):
@@ -334,12 +334,12 @@ def _long_work(gui):
     yield from _begin(gui)
     yield from _end(gui)
     yield 1
-    assert _uvs().any(), "not unwrapped in the end"
+    assert uvs().any(), "not unwrapped in the end"
     gui.shot("13_finished.png")
     yield from _redo(gui, "14_redo_panel_afterwards.png")
     gui.key("ctrl+z")
     yield 2
-    assert not _uvs().any(), "it takes more than one step to undo"
+    assert not uvs().any(), "it takes more than one step to undo"
 
     _add(gui, _sheet(388), lambda one, other: False)
     yield 5
@@ -354,7 +354,7 @@ def _long_work(gui):
     yield from _end(gui)
     yield 2
     gui.shot("16_cancelled.png")
-    assert not _uvs().any() and bpy.context.mode == 'EDIT_MESH', "ESC changed something"
+    assert not uvs().any() and bpy.context.mode == 'EDIT_MESH', "ESC changed something"
 
 
 def _begin(gui):
@@ -430,7 +430,7 @@ def _is_seam(one, other):
     return abs(one.x) + abs(other.x) < 1e-4 and one.y + other.y > -0.5
 
 
-def _show_checker(gui):
+def show_checker(gui):
     image = bpy.data.images.new("Checker", 1024, 1024)
     image.generated_type = 'COLOR_GRID'
     material = bpy.data.materials.new("Checker")
@@ -462,7 +462,7 @@ def _button(gui, editor, below_top):
     return x, y + below_top
 
 
-def _uvs():
+def uvs():
     bm = bmesh.from_edit_mesh(bpy.context.object.data)
     layer = bm.loops.layers.uv.active
     return np.array([loop[layer].uv[:] for face in bm.faces for loop in face.loops]) if layer else np.empty((0, 2))

@@ -8,6 +8,7 @@ A driver like `driver.py`, for the same harness.
 import bpy  # isort: skip  (the wheel knows bmesh only after this)
 import bmesh
 import numpy as np
+from driver import show_checker, uvs
 
 _SIZE = 24  # quads along a side of the sheet
 
@@ -16,7 +17,7 @@ def steps(gui):
     gui.workspace("UV Editing")
     yield 1
     _add_sheet(gui)
-    _show_checker(gui)
+    show_checker(gui)
     _look(gui)
     yield 1
     with gui.override('IMAGE_EDITOR'):
@@ -30,9 +31,9 @@ def steps(gui):
     gui.shot("30_before.png")
     gui.move('IMAGE_EDITOR', fx=0.5, fy=0.5)
     yield 0.5
-    before, chosen = _uvs(), _selected()
+    before, chosen = uvs(), _selected()
     yield from _from_menu(gui, "31_uv_menu.png")
-    after = _uvs()
+    after = uvs()
     assert not np.array_equal(before, after), "the menu entry did nothing"
     assert np.array_equal(before[~chosen], after[~chosen]), "what is not selected moved"
     gui.shot("32_relaxed.png")
@@ -40,9 +41,7 @@ def steps(gui):
 
     with gui.override('IMAGE_EDITOR'):
         bpy.ops.uv.select_all(action='SELECT')
-        bpy.ops.uv.qh_relax('INVOKE_DEFAULT', move_outline=True)
-    yield from _until_done(gui)
-    gui.shot("33_outline_moved.png")
+    yield from _run(gui, bpy.ops.uv.qh_relax, "33_outline_moved.png", move_outline=True)
 
     settings.uv_select_mode = 'EDGE'
     _turn(0.25)
@@ -51,10 +50,7 @@ def steps(gui):
     )
     yield 1
     gui.shot("34_edges.png")
-    with gui.override('IMAGE_EDITOR'):
-        bpy.ops.uv.qh_straighten('INVOKE_DEFAULT', shape='LINES')
-    yield from _until_done(gui)
-    gui.shot("35_straight_edges.png")
+    yield from _run(gui, bpy.ops.uv.qh_straighten, "35_straight_edges.png", shape='LINES')
     gui.key("ctrl+z")
     yield 2
 
@@ -62,10 +58,7 @@ def steps(gui):
     _select(lambda x, y: -0.4 < x < 0.7 and -0.5 < y < 0.4)
     yield 1
     gui.shot("36_quads.png")
-    with gui.override('IMAGE_EDITOR'):
-        bpy.ops.uv.qh_straighten('INVOKE_DEFAULT', shape='RECTANGLE')
-    yield from _until_done(gui)
-    gui.shot("37_rectangle.png")
+    yield from _run(gui, bpy.ops.uv.qh_straighten, "37_rectangle.png", shape='RECTANGLE')
 
     gui.sidebar('IMAGE_EDITOR')
     yield 1
@@ -88,6 +81,14 @@ def _from_menu(gui, shot):
     yield from _until_done(gui)
 
 
+def _run(gui, operator, shot, **options):
+    """Call an operator of ours in the UV Editor, and take a picture when it has ended."""
+    with gui.override('IMAGE_EDITOR'):
+        operator('INVOKE_DEFAULT', **options)
+    yield from _until_done(gui)
+    gui.shot(shot)
+
+
 def _until_done(gui):
     """Until an operator of ours that goes on beside the window has ended, and the window is drawn."""
     for _ in range(100):
@@ -100,7 +101,7 @@ def _until_done(gui):
 def _press(gui, key, text, expected):
     gui.key(key)
     yield 2
-    assert np.array_equal(_uvs(), expected), text
+    assert np.array_equal(uvs(), expected), text
 
 
 def _add_sheet(gui):
@@ -128,23 +129,6 @@ def _look(gui):
         bpy.ops.view3d.view_orbit(angle=0.9, type='ORBITUP')
         bpy.ops.view3d.view_selected()
     gui.area('VIEW_3D').spaces.active.overlay.show_overlays = False
-
-
-def _show_checker(gui):
-    image = bpy.data.images.new("Checker", 1024, 1024)
-    image.generated_type = 'COLOR_GRID'
-    material = bpy.data.materials.new("Checker")
-    material.use_nodes = True
-    texture = material.node_tree.nodes.new("ShaderNodeTexImage")
-    texture.image = image
-    material.node_tree.links.new(
-        texture.outputs["Color"], material.node_tree.nodes["Principled BSDF"].inputs["Base Color"]
-    )
-    material.node_tree.nodes.active = texture
-    bpy.context.object.data.materials.append(material)
-    gui.area('VIEW_3D').spaces.active.shading.color_type = 'TEXTURE'
-    gui.area('IMAGE_EDITOR').spaces.active.image = None
-    gui.area('IMAGE_EDITOR').spaces.active.show_region_toolbar = False
 
 
 def _mesh():
@@ -189,11 +173,6 @@ def _turn(angle):
             loop[layer].uv = turn @ (np.array(loop[layer].uv) - 0.5) + 0.5
     bmesh.update_edit_mesh(bpy.context.object.data)
     bpy.ops.ed.undo_push(message="Turn")
-
-
-def _uvs():
-    bm, layer = _mesh()
-    return np.array([loop[layer].uv[:] for face in bm.faces for loop in face.loops])
 
 
 def _selected():
