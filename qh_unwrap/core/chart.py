@@ -10,7 +10,7 @@ import numpy as np
 
 from . import errors
 from .loops import sorted_loops
-from .ordering import FEW, Dissection, banded
+from .ordering import Dissection, is_large, local_order
 from .topology import HalfEdges, Topology, checked_arrays, edge_keys
 from .triangles import areas_in_space, corner_angles, corners_of, hat_gradients, laid_flat, signed_areas
 
@@ -231,15 +231,17 @@ class Surface(Chart):
 
     @cached_property
     def dissection(self) -> Dissection | None:
-        """How systems on the surface take it apart; None where all pieces are so small that it does not pay."""
-        if np.diff(self.vertex_starts, append=len(self.vertices)).max() <= FEW:
+        """How systems on the surface take it apart; None where no piece is large enough for that."""
+        if not is_large(len(self.vertices), self.vertex_piece):
             return None
         return Dissection.of(self.vertices, self.edges, self.vertex_piece)
 
     @cached_property
     def order(self) -> np.ndarray:
         """The order in which systems on the surface eliminate its vertices, (n,)."""
-        return banded(len(self.vertices), self.edges) if self.dissection is None else self.dissection.order
+        if self.dissection is None:
+            return local_order(len(self.vertices), self.edges, self.vertex_piece)
+        return self.dissection.order
 
     def vertex_sums(self, values: np.ndarray) -> np.ndarray:
         """Of values (n, ...) at vertices over each piece, (p, ...)."""

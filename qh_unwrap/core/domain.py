@@ -16,13 +16,11 @@ from scipy.spatial import cKDTree
 
 from .air import Air, Triangulator, make_air, quality
 from .chart import Chart, Surface, air_chart
-from .ordering import nested_dissection
+from .ordering import elimination_order, local_order
 from .settings import Settings
 from .systems import Constrained
 from .triangles import corners_of, signed_areas
 
-_WINDING = 25  # squared vertices on the outline, by all vertices, from which on the order is made anew with the air,
-_CHEAP = 10_000  # where there are fewer vertices than this, since it takes long for more
 _WORN = 0.2  # air is renewed when a triangle keeps less than this part of its quality
 
 
@@ -200,7 +198,7 @@ class Held:
             self.vertex_piece = np.concatenate([self.vertex_piece, island.hole_piece])
             fixed = fixed.followed_by(np.zeros(len(centres), bool), np.zeros((len(centres), 2)))
         self.triangles = Triangles(self.charts, len(points))
-        order = island.order if plugs is None else nested_dissection(points, self.triangles.edges, self.vertex_piece)
+        order = island.order if plugs is None else elimination_order(points, self.triangles.edges, self.vertex_piece)
         self.constrained = Constrained(order, self.triangles.edges, *fixed, group=self.vertex_piece)
 
     @property
@@ -309,15 +307,10 @@ class Plane:
         self._quality = quality(corners_of(everything, self._air.triangles))
 
     def _order(self, uv):
-        """The island's vertices in the order that they have without air, too, if they are many; unless its outline
-        winds so much, as that of a closed model cut open, that air joins what the order takes apart."""
-        n = len(self.island.vertices)
-        dissection = self.island.dissection
-        rim = sum(len(loop) for loop in self.island.loops)
-        if dissection is None or (n < _CHEAP and rim * rim > _WINDING * n):
-            return nested_dissection(
-                uv, self.triangles.edges, self.vertex_piece if self.island.piece_count > 1 else None
-            )
+        """The order in which to eliminate the vertices; where it is by dissection, that of the island serves on."""
+        n, dissection = len(self.island.vertices), self.island.dissection
+        if dissection is None:
+            return local_order(len(uv), self.triangles.edges, self.vertex_piece)
         # Air is taken apart like the outline beside it.
         outline = np.unique(np.concatenate(self.island.loops))
         inner = outline[~dissection.separates(dissection.key[outline])]

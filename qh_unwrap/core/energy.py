@@ -183,12 +183,16 @@ class Barrier:
 
 def _derivatives(jacobian, hats, weight, density):
     (a, b), (c, d) = jacobian
-    # Singular values in closed form, the second one negative where flipped, and the angles of the singular vectors
-    turn, shear = np.arctan2(c - b, a + d), np.arctan2(c + b, a - d)
-    left, right = (turn + shear) / 2, (turn - shear) / 2
-    s1 = (np.hypot(a + d, c - b) + np.hypot(a - d, c + b)) / 2
+    # The map's derivative is the sum of a similarity and a mirrored one.  Half the sum and the difference of their
+    # lengths are the singular values, the second one negative where flipped; their directions tell those of the vectors.
+    turn, same = _direction(a + d, c - b)
+    shear, mirrored = _direction(a - d, c + b)
+    s1 = (same + mirrored) / 2
     s1 = np.maximum(s1, np.finfo(float).tiny)
     s2 = (a * d - b * c) / s1
+    double = turn[0] * shear[0] - turn[1] * shear[1], turn[0] * shear[1] + turn[1] * shear[0]
+    left = _half(*double)
+    right = turn[0] * left[0] + turn[1] * left[1], turn[1] * left[0] - turn[0] * left[1]
     value, g1, g2, f11, f12, f22 = density(s1, s2)
     value = weight * value
     gap, both = s1 - s2, s1 + s2
@@ -199,11 +203,11 @@ def _derivatives(jacobian, hats, weight, density):
     both, skew = (flip + twist) / 2, (flip - twist) / 2
 
     # The hats' gradients along the right singular vectors: h of the corners, k of the next ones
-    cos, sin = np.cos(right), np.sin(right)
+    cos, sin = right
     x, y = hats[:, 0], hats[:, 1]
     h1, h2 = _with_first(x * cos - y * sin), _with_first(x * sin + y * cos)
     k1, k2 = h1[_FOLLOWING], h2[_FOLLOWING]
-    cos, sin = np.cos(left), np.sin(left)
+    cos, sin = left
     along, across = value * g1 * h1, value * g2 * h2
     gradient = cos * along - sin * across, sin * along + cos * across
 
@@ -212,7 +216,7 @@ def _derivatives(jacobian, hats, weight, density):
     one, other = value / 2 * h1 * k2, value / 2 * h2 * k1
     difference = (f11 - both) * long - (f22 - both) * short
     symmetric = (f12 + skew) * (one + other)
-    cos, sin = np.cos(2 * left), np.sin(2 * left)
+    cos, sin = double
     return (
         *gradient,
         (f11 + both) * long + (f22 + both) * short,
@@ -220,6 +224,24 @@ def _derivatives(jacobian, hats, weight, density):
         difference * sin + symmetric * cos,
         (f12 - skew) * (other - one),
     )
+
+
+def _direction(x, y):
+    """The unit vectors along (x, y), any where that is zero, and the lengths."""
+    length = np.sqrt(x * x + y * y)
+    somewhere = length > 0
+    if somewhere.all():
+        return (x / length, y / length), length
+    by = np.where(somewhere, length, 1)
+    return (np.where(somewhere, x / by, 1), np.where(somewhere, y / by, 0)), length
+
+
+def _half(cos, sin):
+    """Cosine and sine of half an angle that has these, up to the same sign of both."""
+    large = np.sqrt((1 + np.abs(cos)) / 2)
+    small = sin / (2 * large)
+    ahead = cos >= 0
+    return np.where(ahead, large, small), np.where(ahead, small, large)
 
 
 def _with_first(hats):
@@ -230,7 +252,7 @@ def _with_first(hats):
 def _positive(a, b, c):
     """The symmetric matrices [[a, b], [b, c]] with their eigenvalues raised to the least one."""
     mean, half = (a + c) / 2, (a - c) / 2
-    radius = np.hypot(half, b)
+    radius = np.sqrt(half * half + b * b)
     high, low = np.maximum(mean + radius, _SMALLEST), np.maximum(mean - radius, _SMALLEST)
     radius = np.maximum(radius, np.finfo(float).tiny)
     middle, spread = (high + low) / 2, (high - low) / 2

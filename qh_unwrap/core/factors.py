@@ -42,7 +42,8 @@ class Factorizer(Protocol):
 class superlu:  # noqa: N801 (it is called like a function, as a `Factorizer`)
     """L and U by SciPy's SuperLU, of a matrix in its own order.
 
-    The matrices are dominated by their diagonals: no column ordering, no pivoting.
+    The matrices are dominated by their diagonals: no column ordering, no pivoting.  And they are so sparse
+    that panels of several columns would only be mostly empty.
     """
 
     def __init__(self, matrix: csc_array, single: bool):
@@ -57,7 +58,7 @@ class superlu:  # noqa: N801 (it is called like a function, as a `Factorizer`)
             if not np.isfinite(matrix.data).all():  # where SuperLU would read beyond its memory now and then
                 raise RuntimeError("the matrix is not finite")
             options = {"SymmetricMode": True}
-            self._factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+            self._factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, panel_size=1, options=options)
         except RuntimeError:
             if not self.sharpened():
                 text = "its equations have no solution: merge its vertices by distance, or mark seams"

@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 
 from .cuttable import Cuttable
 from .factors import superlu
-from .ordering import nested_dissection
+from .ordering import elimination_order
 from .triangles import corner_angles, laid_flat
 
 _LEAST, _LARGEST = 0.01, 20.0  # weights of edges, those of equilateral triangles being 0.58: cotangents can be negative
@@ -56,7 +56,7 @@ class Foresight:
         edges, weight = edges[between], self._weight[between]
         middle = np.empty((nodes, 3))
         middle[self._node] = mesh.points
-        self._order = nested_dissection(middle, edges)
+        self._order = elimination_order(middle, edges)
         place = np.empty(nodes, np.int64)
         place[self._order] = np.arange(nodes)
         self._place = place[self._node]

@@ -6,25 +6,56 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mckee
+from scipy.sparse.linalg import spilu
 
 _LEAF = 16  # vertices: so few are not divided any further
-FEW = 300  # vertices whose order hardly matters
+_FEW = 150  # vertices of the largest piece, up to which a band hardly fills in,
+_MANY = 25_000  # and beyond which dissection leaves less fill than minimum degree
 
 
-def banded(n: int, edges: np.ndarray) -> np.ndarray:
-    """An elimination order (n,) that suits a small graph, or many of them: neighbours come soon after one another."""
+def elimination_order(points: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
+    """An order (n,) in which to eliminate vertices at `points` (n, d) with little fill.
+
+    No edge may join vertices of two groups; `group` (n,) numbers that of each vertex, by default one for all.
+    """
+    if is_large(len(points), group):
+        return Dissection.of(points, edges, group).order
+    return local_order(len(points), edges, group)
+
+
+def is_large(n: int, group: np.ndarray | None) -> bool:
+    """Whether there is a group of so many vertices that a dissection suits them best."""
+    return _largest(n, group) > _MANY
+
+
+def local_order(n: int, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
+    """The same for groups that are not large, which needs no points."""
+    if not len(edges):
+        return np.arange(n)
+    if _largest(n, group) <= _FEW:
+        return _banded(n, edges)
+    order = _by_minimum_degree(n, edges)
+    return order if group is None else order[np.argsort(group[order], kind="stable")]  # one after the other
+
+
+def _banded(n, edges):
+    """Neighbours soon after one another."""
     graph = coo_array((np.ones(len(edges), np.int8), tuple(edges.T)), shape=(n, n))
     return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
 
 
-def nested_dissection(points: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
-    """An elimination order (n,) with little fill, by recursive bisection of `points` (n, d).
-
-    No edge may join vertices of two groups; `group` (n,) numbers that of each vertex, by default one for all.
-    """
-    if len(edges) and _largest(len(points), group) <= FEW:
-        return banded(len(points), edges)
-    return Dissection.of(points, edges, group).order
+def _by_minimum_degree(n, edges):
+    """The vertex with the fewest neighbours next, as SuperLU finds it; of its factors nothing else is wanted."""
+    i, j = edges.T.astype(np.int32)
+    own = np.arange(n, dtype=np.int32)
+    row, column = np.concatenate([i, j, own]), np.concatenate([j, i, own])
+    values = np.zeros(len(row), np.float32)
+    values[-n:] = 1
+    matrix = coo_array((values, (row, column)), shape=(n, n)).tocsc()
+    factors = spilu(matrix, drop_tol=1.0, fill_factor=1, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+    order = np.empty(n, np.int64)
+    order[factors.perm_c] = own
+    return order
 
 
 def _largest(n, group):

@@ -7,6 +7,7 @@ The pattern of the matrices is found once; every new set of weights is only put 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 from scipy.sparse import bsr_array, coo_array, csc_array
@@ -107,25 +108,31 @@ class Pattern:
             where = row.astype(np.int32), column.astype(np.int32)
             pattern = coo_array((entry, where), shape=(size, size)).tocsc()
             self._entry, self.indices, self.indptr = pattern.data, pattern.indices, pattern.indptr
+        nothing = np.empty(len(self.indices))
+        self._empty = csc_array((nothing, self.indices, self.indptr), shape=(self.size, self.size))
 
     def matrix(self, forward: np.ndarray, backward: np.ndarray, diagonal: np.ndarray) -> csc_array:
         entries = np.concatenate([forward, backward, diagonal])[self._entry]
         if self._slot is not None:
             entries = np.bincount(self._slot, entries, len(self.indices))
-        return csc_array((entries, self.indices, self.indptr), shape=(self.size, self.size))
+        matrix = copy(self._empty)  # checked once
+        matrix.data = entries
+        return matrix
 
     def block_matrix(
-        self, beside: Sequence[np.ndarray], own: Sequence[np.ndarray], blocks: np.ndarray | None = None
+        self, beside: Sequence[np.ndarray], own: Sequence[np.ndarray], earlier: bsr_array | None = None
     ) -> bsr_array:
         """The symmetric matrix of 2 by 2 blocks [[m + d, s - a], [s + a, m - d]], where no vertices are tied.
 
         `beside` is (m, d, s, a), (k,) each, of the blocks (i, j), and `own` (m, d, s), (n,) each, of the blocks (i, i),
-        which are symmetric.  The array `blocks` of an earlier matrix is overwritten: fresh memory takes longer.
+        which are symmetric.  An `earlier` matrix is overwritten: fresh memory takes longer.
         """
         k = len(beside[0])
         rows = [np.concatenate(both) for both in zip(beside, (*own, np.zeros(len(own[0]))), strict=True)]
-        if blocks is None:
-            blocks = np.empty((len(self._entry), 2, 2))
+        if earlier is None:
+            blocks, shape = np.empty((len(self._entry), 2, 2)), (2 * self.size, 2 * self.size)
+            earlier = bsr_array((blocks, self.indices, self.indptr), shape=shape)
+        blocks = earlier.data
         for part in parts(len(self._entry)):
             entry, block = self._entry[part], blocks[part]
             ahead = entry < k
@@ -135,7 +142,7 @@ class Pattern:
             a = np.where(ahead, -a, a)
             block[:, 0, 0], block[:, 1, 1] = m + d, m - d
             block[:, 0, 1], block[:, 1, 0] = s - a, s + a
-        return bsr_array((blocks, self.indices, self.indptr), shape=(2 * self.size, 2 * self.size))
+        return earlier
 
 
 class Constrained:
@@ -174,7 +181,7 @@ class Constrained:
         self._order, self._factorizer = order, factorizer
         self._group = None if group is None or not len(group) or (group == group[0]).all() else group
         self._mean: list[Factors] | None = None
-        self._blocks: np.ndarray | None = None
+        self._matrix: bsr_array | None = None
         self._all: Pattern | None = None
 
     def refixed(self, held: np.ndarray, values: np.ndarray, partner: np.ndarray | None = None) -> Constrained:
@@ -296,14 +303,12 @@ class Constrained:
     def _hessian(self, beside: Sequence[np.ndarray], own: Sequence[np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
         """The product of the Hessian with values of the unknowns, shaped as these."""
         if self.alike and not self.unknowns[0].tied:
-            matrix = self.patterns[0].block_matrix(beside, own, self._blocks)
-            self._blocks = matrix.data
+            matrix = self._matrix = self.patterns[0].block_matrix(beside, own, self._matrix)
             return lambda values: (matrix @ values.ravel()).reshape(values.shape)
         # What is not free in both coordinates alike has no blocks: multiply with those of all vertices.
         if self._all is None:
             self._all = Pattern(Unknowns(self._order, np.zeros(len(self._order), bool)), self.edges)
-        matrix = self._all.block_matrix(beside, own, self._blocks)
-        self._blocks = matrix.data
+        matrix = self._matrix = self._all.block_matrix(beside, own, self._matrix)
 
         def product(values):
             moved = np.zeros((len(self._order), 2))

@@ -99,6 +99,7 @@ def _unwrapped(shapes, settings, triangulate):
     work = [_FIXED + _size(shape) for shape in shapes]
     done, furthest, total = 0.0, 0.0, max(sum(work), 1)
     waiting = _portions(shapes)[::-1]
+    memory.keep()
     while waiting:
         portion = waiting.pop()
         its_work = sum(work[k] for k in portion) / total

@@ -5,7 +5,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
 from qh_unwrap.core import Surface, ordering
-from qh_unwrap.core.ordering import nested_dissection
+from qh_unwrap.core.ordering import elimination_order
 from qh_unwrap.core.pieces import joined
 
 from . import shapes
@@ -26,37 +26,37 @@ def fill(surface, order=None):
 def test_the_order_is_a_permutation_with_less_fill_than_the_generic_one():
     vertices, triangles = shapes.random_disk(3, inner=6000, outer=200)
     surface = Surface(vertices, triangles)
-    order = nested_dissection(surface.vertices, surface.edges)
+    order = elimination_order(surface.vertices, surface.edges)
     assert (np.sort(order) == np.arange(len(order))).all()
     assert fill(surface, order) < 0.8 * fill(surface)
 
 
 def test_more_levels_than_short_integers_number_make_no_worse_order(monkeypatch):
     surface = Surface(*shapes.grid(200, 200))
-    usual = fill(surface, nested_dissection(surface.vertices, surface.edges))
+    usual = fill(surface, elimination_order(surface.vertices, surface.edges))
     monkeypatch.setattr(ordering, "_LEAF", 1)
-    order = nested_dissection(surface.vertices, surface.edges)
+    order = elimination_order(surface.vertices, surface.edges)
     assert (np.sort(order) == np.arange(len(order))).all()
     assert fill(surface, order) < 1.02 * usual
 
 
 def test_orders_of_tiny_and_edgeless_graphs():
     for n in range(6):
-        order = nested_dissection(np.random.default_rng(n).random((n, 3)), np.zeros((0, 2), int))
+        order = elimination_order(np.random.default_rng(n).random((n, 3)), np.zeros((0, 2), int))
         assert sorted(order.tolist()) == list(range(n))
     same = np.zeros((50, 3))
     chain = np.column_stack([np.arange(49), np.arange(1, 50)])
-    assert sorted(nested_dissection(same, chain).tolist()) == list(range(50))
+    assert sorted(elimination_order(same, chain).tolist()) == list(range(50))
 
 
 @pytest.mark.parametrize("inner", [(40, 90, 20), (900, 60, 2500, 300)])
 def test_pieces_are_eliminated_with_as_little_fill_as_alone(inner):
     meshes = [shapes.bump(k, inner=count, outer=20 + count // 20) for k, count in enumerate(inner)]
     batch = Surface(*joined(*zip(*meshes, strict=True)))
-    order = nested_dissection(batch.vertices, batch.edges, batch.vertex_piece)
+    order = elimination_order(batch.vertices, batch.edges, batch.vertex_piece)
     assert (np.sort(order) == np.arange(len(order))).all()
     assert (np.diff(batch.vertex_piece[order]) != 0).sum() == len(meshes) - 1, "a piece is done before the next begins"
     alone = 0
     for surface in (Surface(*mesh) for mesh in meshes):
-        alone += fill(surface, nested_dissection(surface.vertices, surface.edges))
+        alone += fill(surface, elimination_order(surface.vertices, surface.edges))
     assert fill(batch, order) < 1.1 * alone
