@@ -7,7 +7,6 @@ It speaks of the 32-bit floats that Blender stores.  Whoever certifies what Blen
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +16,8 @@ from .triangles import by_parts, corners_of
 if TYPE_CHECKING:
     from .chart import Chart, Surface
 
+_CROWDED = 30  # pairs that lie side by side for each box, from which on strips pay
+_MOST = 1_000_000  # strips of all groups, that rounding can tell apart
 _PORTION = 1_000_000  # pairs of boxes that are looked at together, about: it bounds the memory
 
 
@@ -41,12 +42,25 @@ def _exact_turn(a, b, c):
     first, second = bx * cy, by * cx
     # Rounding keeps the order of numbers: the exact products differ as the rounded ones do, or else as their errors.
     result = np.sign(np.where(first == second, _error(bx, cy) - _error(by, cx), first - second)).astype(np.int8)
+    # Where two of the points are one, they lie on a line whatever was rounded.
+    alike = (a == b).all(axis=1) | (b == c).all(axis=1) | (a == c).all(axis=1)
     rounded = ((b - a) + a != b) | ((b - a) - b != -a) | ((c - a) + a != c) | ((c - a) - c != -a)
-    for k in np.flatnonzero(rounded.any(axis=1)):  # the differences already are no longer exact: count in fractions
-        (ax, ay), (bx, by), (cx, cy) = ([Fraction(value) for value in point[k].tolist()] for point in (a, b, c))
-        det = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        result[k] = (det > 0) - (det < 0)
+    for k in np.flatnonzero(rounded.any(axis=1) & ~alike):
+        result[k] = turn_of_whole_numbers(a[k].tolist(), b[k].tolist(), c[k].tolist())
+    result[alike] = 0
     return result
+
+
+def turn_of_whole_numbers(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> int:
+    """As `turn`, of three points given as pairs of floats, for differences that floats do not tell exactly.
+
+    All are whole numbers of the smallest unit among them, a power of two.
+    """
+    ratios = [value.as_integer_ratio() for value in (*a, *b, *c)]
+    unit = max(denominator for _, denominator in ratios)
+    ax, ay, bx, by, cx, cy = (numerator * (unit // denominator) for numerator, denominator in ratios)
+    det = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    return (det > 0) - (det < 0)
 
 
 def _error(x, y):
@@ -168,22 +182,45 @@ def crossings(polygons: Sequence[np.ndarray], group: np.ndarray, touching: bool 
 def near_boxes(low: np.ndarray, high: np.ndarray, group: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield the pairs of boxes that meet or touch and are of one group, as two arrays of numbers (k,), some at a time.
 
-    Boxes reach from `low` to `high`, (n, 2) each, and belong to the groups `group` (n,).  They are sorted by where they
-    begin along one axis: a box can only meet those after it that begin before it ends.  To sort all groups at once,
-    each is moved along that axis so far that none reaches the next.
+    Boxes reach from `low` to `high`, (n, 2) each, and belong to the groups `group` (n,).  Where too many lie side by
+    side, the plane is cut into strips, and each strip has its part of a box.
     """
     axis = int(np.argmax(np.ptp(low, axis=0)))
-    apart = 2 * (np.ptp(np.vstack([low, high])[:, axis]) + 1e-30)
-    begin, close = low[:, axis] + apart * group, high[:, axis] + apart * (group + 1e-9)  # more than rounding takes
-    order = np.argsort(begin, kind="stable")
-    count = np.searchsorted(begin[order], close[order], side="right") - np.arange(len(order)) - 1
+    box, first = np.arange(len(low)), np.zeros(len(low), int)
+    strip = first
+    order, count = _swept(low[:, axis], high[:, axis], group)
+    if count.sum() > _CROWDED * len(box):
+        box, strip, first = _strips(low[:, 1 - axis], high[:, 1 - axis], _MOST // (group.max() + 1))
+        group = group[box] * (strip.max() + 1) + strip
+        order, count = _swept(low[box, axis], high[box, axis], group)
     for part in np.array_split(np.arange(len(order)), 1 + count.sum() // _PORTION):
         total = np.cumsum(count[part])
         one = np.repeat(part, count[part])
         other = one + 1 + np.arange(len(one)) - np.repeat(total - count[part], count[part])
-        one, other = order[one], order[other]
+        one, other, its = box[order[one]], box[order[other]], strip[order[one]]
         near = (low[one] <= high[other]).all(axis=1) & (low[other] <= high[one]).all(axis=1)
+        near &= its == np.maximum(first[one], first[other])  # of all strips that two share, the first
         yield one[near], other[near]
+
+
+def _swept(low, high, group):
+    """The intervals from `low` to `high`, (n,) each, in the order in which they begin, group by group; and how many
+    after each begin before it ends, (n,).  To sort all groups at once, each is moved so far that none reaches the next.
+    """
+    apart = 2 * (high.max() - low.min() + 1e-30)
+    begin, end = low + apart * group, high + apart * (group + 1e-9)  # more than rounding takes
+    order = np.argsort(begin, kind="stable")
+    return order, np.searchsorted(begin[order], end[order], side="right") - np.arange(len(order)) - 1
+
+
+def _strips(low, high, most):
+    """Parts of intervals from `low` to `high`, (n,) each, in strips twice as wide as these, at `most` about so many:
+    the number of the interval and that of the strip for every part, and the first strip of every interval."""
+    width = max(2 * float((high - low).mean()), float(np.ptp(low)) / max(most, 1), np.finfo(float).tiny)
+    first, last = (np.floor((each - low.min()) / width).astype(np.int64) for each in (low, high))
+    count = last - first + 1
+    whose = np.repeat(np.arange(len(low)), count)
+    return whose, first[whose] + np.arange(len(whose)) - np.repeat(np.cumsum(count) - count, count), first
 
 
 def wrong_triangles(chart: Chart, uv: np.ndarray) -> np.ndarray:

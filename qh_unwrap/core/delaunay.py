@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay, QhullError
 
-from .certificate import turn
+from .certificate import turn, turn_of_whole_numbers
 
 _JOGGLE = 1e-11  # how far Qhull's points are moved, relative to their extent: many on one circle would take it longer
 _ROUNDING = 1e-15  # largest rounding error of `turn`, relative to its terms (Shewchuk 1997, with a margin)
@@ -225,7 +225,7 @@ class _Mesh:
         # Differences of numbers are 0 only if these are equal; so there rounding decides nothing.
         if abs(apart) > _ROUNDING * (abs(first) + abs(second)) or first == 0 or second == 0:
             return apart
-        return _exact_turn((ax, ay), (x[b], y[b]), (x[c], y[c]))
+        return turn_of_whole_numbers((ax, ay), (x[b], y[b]), (x[c], y[c]))
 
     def put_in(self, a: int, b: int) -> bool:
         """Make the side from a to b an edge; False if a point or another side is in the way.
@@ -430,11 +430,3 @@ def _in_circle(ax, ay, bx, by, cx, cy, dx, dy):
     a2, b2, c2 = ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy
     terms = a2 * (abs(bc) + abs(cb)) + b2 * (abs(ca) + abs(ac)) + c2 * (abs(ab) + abs(ba))
     return a2 * (bc - cb) + b2 * (ca - ac) + c2 * (ab - ba) > _CIRCLE_ROUNDING * terms
-
-
-def _exact_turn(a, b, c):
-    """As `_Mesh.turn`, of three points given as pairs of floats, in whole numbers."""
-    ratios = [value.as_integer_ratio() for value in (*a, *b, *c)]
-    whole = max(denominator for _, denominator in ratios)  # all are powers of two
-    ax, ay, bx, by, cx, cy = (numerator * (whole // denominator) for numerator, denominator in ratios)
-    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)

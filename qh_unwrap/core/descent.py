@@ -25,6 +25,7 @@ _LENGTHENINGS = 4  # of the step, at most
 _NEGLIGIBLE = 1e-3  # a decrease smaller than this, relative to the energy, is not worth another step,
 _LITTLE = 2e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
 _INVISIBLE = 1e-6  # a decrease of the energy that nobody could see
+_CUT = 0.8  # of Newton's own step: one that ends before is cut short
 _SPRING = 1e-9  # that holds every vertex in its place, relative to what acts on it
 _RESIDUAL = 0.03  # of Newton's equations, relative to the gradient,
 _SHARP = 0.002  # and where few triangles rule the gradient, so that the others go where they should not:
@@ -45,12 +46,14 @@ class Descent:
     def __init__(self, balance: float, size: np.ndarray, patience: float = 1.0):
         self._balance, self._size, self._patience = balance, size, patience
         self._residual = np.full(len(size), _RESIDUAL)
-        self._little = np.zeros(len(size), bool)  # whether the last step brought little
+        self._little = np.zeros(len(size), bool)  # whether the last step brought little,
+        self._hindered = np.ones(len(size), bool)  # and whether it was cut short
 
     def of(self, pieces: np.ndarray) -> Descent:
         """The same of the chosen pieces (p,) bool alone."""
         part = Descent(self._balance, self._size[pieces], self._patience)
         part._residual, part._little = self._residual[pieces], self._little[pieces]
+        part._hindered = self._hindered[pieces]
         return part
 
     def step(
@@ -61,7 +64,7 @@ class Descent:
         Returns the map before, maybe with new air, the map after, and for which pieces (p,) no further step would pay.
         Pieces with flips stay and are done.  Yields `PART` now and then.
         """
-        uv = domain.renewed(uv)
+        uv = domain.renewed(uv, self._hindered)
         energy = Barrier(domain, uv, self._balance, self._size)
         before = energy.jacobian(uv)
         start = energy.value(before)
@@ -77,7 +80,7 @@ class Descent:
         yield PART
         after, value, moved, slope, limit = _moved(domain, energy, uv, before, start, going, gradient, direction)
         hard = (limit < _SHORT) | (value > _EXTREME * energy.least)
-        self._residual = np.where(hard, _SHARP, _RESIDUAL)
+        self._residual, self._hindered = np.where(hard, _SHARP, _RESIDUAL), going & (limit < _CUT)
         worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
         little = start - value < worth / self._patience
         # What was cut short and promised more gets another step.
@@ -92,6 +95,7 @@ class Descent:
         descent = self.of(sound)
         _, its_uv, its_done = yield from descent.step(part, its_uv, going[sound])
         self._residual[sound], self._little[sound] = descent._residual, descent._little
+        self._hindered[sound] = descent._hindered
         done = np.ones(len(sound), bool)
         done[sound] = its_done
         after = uv.copy()

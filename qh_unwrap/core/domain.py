@@ -21,7 +21,8 @@ from .settings import Settings
 from .systems import Constrained
 from .triangles import corners_of, signed_areas
 
-_WORN = 0.2  # air is renewed when a triangle keeps less than this part of its quality
+_WORN = 0.05  # air is renewed when a triangle keeps less than this part of its quality,
+_IN_THE_WAY = 0.2  # or less than this where it may be what keeps steps short
 
 
 Walls = Sequence[np.ndarray | None] | None
@@ -55,8 +56,11 @@ class Domain(Protocol):
     @property
     def constrained(self) -> Constrained: ...
 
-    def renewed(self, uv: np.ndarray) -> np.ndarray:
-        """The map `uv` itself, or the same map of the island with other vertices beside it, and the domain adapted."""
+    def renewed(self, uv: np.ndarray, hindered: np.ndarray | bool = True) -> np.ndarray:
+        """The map `uv` itself, or the same map of the island with other vertices beside it, and the domain adapted.
+
+        hindered  (p,) bool, in which pieces steps are cut short
+        """
         ...
 
     def start(self, uv: np.ndarray) -> np.ndarray:
@@ -217,7 +221,7 @@ class Held:
             return uv
         return np.vstack([uv, *(uv[loop].mean(axis=0) for loop in self.island.holes)])
 
-    def renewed(self, uv: np.ndarray) -> np.ndarray:
+    def renewed(self, uv: np.ndarray, hindered: np.ndarray | bool = True) -> np.ndarray:
         return uv
 
     def recalled(self, uv: np.ndarray, earlier: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -329,10 +333,12 @@ class Plane:
         """The island's map (n, 2) with the air's vertices where they were when the air was made."""
         return np.vstack([uv[: len(self.island.vertices)], *(air.points for air in self._airs)])
 
-    def renewed(self, uv: np.ndarray) -> np.ndarray:
+    def renewed(self, uv: np.ndarray, hindered: np.ndarray | bool = True) -> np.ndarray:
         now = quality(corners_of(uv, self._air.triangles))
         worn = np.zeros(self.island.piece_count, bool)
-        worn[self._air.piece[~(now > _WORN * self._quality)]] = True
+        least = np.where(hindered, _IN_THE_WAY, _WORN)
+        least = least[self._air.piece] if least.ndim else least
+        worn[self._air.piece[~(now > least * self._quality)]] = True
         return self._remade(uv, worn)[0] if worn.any() else uv
 
     def recalled(self, uv: np.ndarray, earlier: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -184,7 +184,7 @@ class Barrier:
 def _derivatives(jacobian, hats, weight, density):
     (a, b), (c, d) = jacobian
     # The map's derivative is the sum of a similarity and a mirrored one.  Half the sum and the difference of their
-    # lengths are the singular values, the second one negative where flipped; their directions tell those of the vectors.
+    # lengths are the singular values, the second one negative where flipped, and their directions give the vectors.
     turn, same = _direction(a + d, c - b)
     shear, mirrored = _direction(a - d, c + b)
     s1 = (same + mirrored) / 2
