@@ -99,6 +99,16 @@ def strip(length, segments, bend=0.0):
     return vertices, triangles
 
 
+def subdivided(vertices, triangles):
+    """Every triangle cut in four at the middles of its edges, which are numbered after the vertices."""
+    sides = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    edges, number = np.unique(sides, axis=0, return_inverse=True)
+    a, b, c = triangles.T
+    ab, bc, ca = len(vertices) + number.reshape(3, -1)
+    parts = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+    return np.vstack([vertices, vertices[edges].mean(axis=1)]), np.vstack([np.column_stack(part) for part in parts])
+
+
 def cut(vertices, triangles, keep):
     """The triangles whose centres `keep` accepts, and their vertices."""
     triangles = triangles[keep(*vertices[triangles].mean(axis=1).T)]

@@ -60,3 +60,18 @@ def test_pieces_are_eliminated_with_as_little_fill_as_alone(inner):
     for surface in (Surface(*mesh) for mesh in meshes):
         alone += fill(surface, elimination_order(surface.vertices, surface.edges))
     assert fill(batch, order) < 1.1 * alone
+
+
+@pytest.mark.parametrize("shuffled", [False, True])
+def test_however_a_regular_mesh_is_numbered_its_order_leaves_little_fill(shuffled):
+    # halved again and again, as subdivision does: its vertices are numbered level by level
+    vertices, triangles = shapes.grid(6, 6)
+    for _ in range(4):
+        vertices, triangles = shapes.subdivided(vertices, triangles)
+    if shuffled:
+        number = np.random.default_rng(0).permutation(len(vertices))
+        vertices, triangles = vertices[np.argsort(number)], number[triangles]
+    surface = Surface(vertices, triangles)
+    order = elimination_order(surface.vertices, surface.edges)
+    dissected = ordering.Dissection.of(surface.vertices, surface.edges).order
+    assert fill(surface, order) < 1.1 * fill(surface, dissected)
