@@ -17,9 +17,9 @@ from .triangles import parts
 
 _STEPS = 100  # of conjugate gradients, at most
 # Of one piece; islands that go together with others have fewer unknowns.
-_LARGE = 4000  # unknowns, from which on old factors are tried first, and preconditioners are in single precision
+_LARGE = 4000  # unknowns, from which on preconditioners are in single precision
+_HUGE = 30_000  # unknowns, from which on it pays to correct solutions in single precision, and to try old factors first
 _PATIENCE = 7  # steps of conjugate gradients that an old factorization may take
-_HUGE = 30_000  # unknowns, from which on it pays to solve in single precision and to correct the solutions
 
 
 class Unknowns:
@@ -279,7 +279,7 @@ class Constrained:
             sharper = [factors.sharpened() for factors in self._mean] if missed else []
             if any(sharper):
                 solution, _ = self._conjugate_gradients(hessian, rhs, np.zeros_like(rhs), residual, _STEPS)
-            if tried or not self._is_alone(_LARGE):
+            if tried or not self._is_alone(_HUGE):
                 self._mean = None
         self._scattered(solution, direction)
         return direction

@@ -217,7 +217,7 @@ def test_every_piece_is_solved_to_its_own_residual():
 
 
 def test_an_earlier_factorization_serves_or_is_replaced(monkeypatch):
-    monkeypatch.setattr(systems, "_LARGE", 0)
+    monkeypatch.setattr(systems, "_HUGE", 0)
     surface = Surface(*shapes.bump(2))
     n = len(surface.vertices)
     rng = np.random.default_rng(2)
