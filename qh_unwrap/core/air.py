@@ -24,6 +24,8 @@ _SAMPLES = 5  # points of a wall that the air around keeps its distance from
 _COARSEST = 4  # edges of the coarsest air that reach from the middle to the circle
 _FINEST = 64  # edges of the finest air that reach across the island's radius, at most,
 _COARSER = 2  # times as long as those of the outline
+_UNEVEN = 1e-3  # of a grid's step
+_EVEN = 1e-6  # by the cube of the outline: how little longer sides may lie to one side for no axis to be told by them
 
 
 class Air(NamedTuple):
@@ -46,14 +48,15 @@ def make_air(
     start = uv[outline]
     following = np.concatenate([np.roll(loop, -1) for loop in loops])
     end = uv[following]
-    centre = (start.min(axis=0) + start.max(axis=0)) / 2
+    centre, axes = _frame(start, end)
     radius = np.linalg.norm(start - centre, axis=1).max()
     if not radius > 0:
         return None
     angle = 2 * np.pi * np.arange(_CIRCLE) / _CIRCLE
-    circle = centre + _RADIUS * radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    circle = centre + _RADIUS * radius * np.column_stack([np.cos(angle), np.sin(angle)]) @ axes
     built, wall_sides = _walls(start, walls, centre, radius)
-    between = _graded_points(start, end, centre, radius, np.vstack([start, built])[wall_sides])
+    seen = ((each - centre) @ axes.T for each in (start, end, np.vstack([start, built])[wall_sides]))
+    between = centre + _graded_points(*seen, radius) @ axes
 
     place = np.empty(len(uv), dtype=np.int64)
     place[outline] = np.arange(len(outline))
@@ -79,6 +82,19 @@ def make_air(
     solid = orientation(np.vstack([uv, points]), triangles) > 0
     number = np.arange(added)
     return Air(points, (number < len(built)) | (number >= added - _CIRCLE), triangles[solid])
+
+
+def _frame(start, end):
+    """The middle of closed polygons with sides from `start` to `end` (s, 2), and two axes (2, 2), its rows, that turn
+    with the polygons and are mirrored with them: so the air around them does, too."""
+    middle, length = (start + end) / 2, np.linalg.norm(end - start, axis=1)
+    centre = length @ middle / length.sum() if length.any() else start[0]
+    # Longer sides lie rather on one side of the middle, and if they do not, any axis is as good.
+    x, y = length**2 @ (middle - centre)
+    size = np.hypot(x, y)
+    if not size > _EVEN * length.sum() ** 3:
+        return centre, np.eye(2)
+    return centre, np.array([[x, y], [-y, x]]) / size
 
 
 def _walls(start, walls, centre, radius):
@@ -117,9 +133,9 @@ def _within_circle(walls, centre, radius):
     return np.stack(ends, axis=1)
 
 
-def _graded_points(start, end, centre, radius, walls):
-    """Points on ever coarser triangular grids, each about as far from its neighbours as from the outline and from
-    walls (w, 2, 2)."""
+def _graded_points(start, end, walls, radius):
+    """Points on ever coarser triangular grids around the origin, which are alike above and below the first axis, each
+    about as far from its neighbours as from the outline and from walls (w, 2, 2)."""
     length = np.linalg.norm(end - start, axis=1)
     reach = _RADIUS * radius
     coarsest = step = reach / _COARSEST
@@ -138,15 +154,23 @@ def _graded_points(start, end, centre, radius, walls):
         if step == coarsest:
             cells, around, farthest = np.zeros((1, 2), np.int64), int(np.ceil(reach / step)), np.inf
         else:  # only near the outline
-            cells, around, farthest = np.floor((samples - centre) / step).astype(np.int64), 3, 2 * step
+            cells, around, farthest = np.floor(samples / step).astype(np.int64), 3, 2 * step
         column, row = _cells_around(cells, around).T
-        grid = centre + step * np.column_stack([column + row % 2 / 2 + 0.25, row + 0.25])
+        # Half a step aside, so that no grid has its points next to those of a coarser one
+        grid = step * np.column_stack([column + row % 2 / 2 + 0.5, row]) + _UNEVEN * step * _noise(column, row)
         distance = tree.query(grid, distance_upper_bound=farthest)[0]
-        inside = np.linalg.norm(grid - centre, axis=1) < reach - step / 2
+        inside = np.linalg.norm(grid, axis=1) < reach - step / 2
         grids.append(grid[(distance >= step) & (distance < farthest) & inside])
         step /= 2
     grid = np.vstack(grids)
     return grid[~_within(grid, start, end)]
+
+
+def _noise(column, row):
+    """Numbers from -1 to 1 by which grid points are moved (k, 2): else four often lie on a circle, and rounding would
+    decide which triangles they make."""
+    phase = 12.9898 * column + 78.233 * np.abs(row)
+    return np.column_stack([np.sin(phase * phase), np.sign(row) * np.sin(phase * phase + 1)])
 
 
 def _cells_around(cells, width):

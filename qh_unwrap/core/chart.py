@@ -53,6 +53,11 @@ class Chart(HalfEdges):
         return signed_areas(self.rest)
 
     @cached_property
+    def has_void(self) -> bool:
+        """Whether the surface has no area in some triangle."""
+        return bool((self.measure == 0).any())
+
+    @cached_property
     def hats(self) -> np.ndarray:
         """Gradients, in `rest`, of the hat functions of every triangle's second and third corners, (2, 2, m)."""
         return hat_gradients(self.rest)

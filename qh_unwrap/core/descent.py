@@ -45,6 +45,7 @@ class Descent:
 
     def __init__(self, balance: float, size: np.ndarray, patience: float = 1.0):
         self._balance, self._size, self._patience = balance, size, patience
+        self._energy: Barrier | None = None
         self._residual = np.full(len(size), _RESIDUAL)
         self._little = np.zeros(len(size), bool)  # whether the last step brought little,
         self._hindered = np.ones(len(size), bool)  # and whether it was cut short
@@ -65,7 +66,7 @@ class Descent:
         Pieces with flips stay and are done.  Yields `PART` now and then.
         """
         uv = domain.renewed(uv, self._hindered)
-        energy = Barrier(domain, uv, self._balance, self._size)
+        energy = self._energy_of(domain, uv)
         before = energy.jacobian(uv)
         start = energy.value(before)
         sound = np.isfinite(start)
@@ -87,6 +88,14 @@ class Descent:
         hindered = (limit < 1) & (-slope / 2 > worth) & ~self._little
         self._little = little
         return uv, after, ~moved | (little & ~hindered)
+
+    def _energy_of(self, domain, uv):
+        """The energy with its air as in `uv`; what does not depend on that serves on."""
+        if self._energy is None or self._energy.triangles is not domain.triangles:
+            self._energy = Barrier(domain, uv, self._balance, self._size)
+        else:
+            self._energy.rest(uv)
+        return self._energy
 
     def _step_of_some(self, domain, uv, going, sound):
         """The map after a step of the `sound` pieces alone, and which are done: equations of flipped triangles are no

@@ -73,32 +73,39 @@ class Barrier:
 
     def __init__(self, domain: Domain, uv: np.ndarray, balance: float, size: np.ndarray):
         self._domain, self._balance = domain, balance
-        everything = domain.triangles
+        self.triangles = everything = domain.triangles
         self.corners, self._single = everything.corners, len(size) == 1
         self._hats, self._weight = np.empty((2, 2, self.corners.shape[1])), np.empty(self.corners.shape[1])
-        solid = self._solid = [(chart, part) for chart, part in everything if not chart.is_air]
-        air = [(chart, part) for chart, part in everything if chart.is_air]
-        total = sum(chart.sums(chart.barrier) for chart, _ in solid)
-        for chart, part in solid:
+        self._solid = [(chart, part) for chart, part in everything if not chart.is_air]
+        self._air = [(chart, part) for chart, part in everything if chart.is_air]
+        self._total = sum(chart.sums(chart.barrier) for chart, _ in self._solid)
+        for chart, part in self._solid:
             np.divide(chart.hats, self._at(size, chart), out=self._hats[..., part])
-            np.divide(chart.barrier, self._at(total, chart), out=self._weight[part])
-        for chart, part in air:
-            self._hats[..., part] = hat_gradients(chart.shapes(uv))
-            self._weight[part] = 0
+            np.divide(chart.barrier, self._at(self._total, chart), out=self._weight[part])
+        self.rest(uv)
+
+    def rest(self, uv: np.ndarray) -> None:
+        """Take the shape that the air has in the map `uv` (n, 2), which is to be improved, for that at rest."""
         # A face without area in space that lies folded over bars nothing: nothing could be done about it.
         self._void = None
-        for chart, part in solid:
+        for chart, part in self._solid:
+            if not chart.has_void:
+                continue
             folded = (chart.measure == 0) & ~(signed_areas(corners_of(uv, chart.triangles)) > 0)
-            if folded.any():
-                self._void = np.zeros(len(self._weight), bool) if self._void is None else self._void
-                self._void[part] = folded
-                self._weight[part][folded] = 0
-        if air:
+            self._void = np.zeros(len(self._weight), bool) if self._void is None else self._void
+            self._void[part] = folded
+            self._weight[part] = np.where(folded, 0, chart.barrier / self._at(self._total, chart))
+        if self._void is not None and not self._void.any():
+            self._void = None
+        for chart, part in self._air:
+            self._hats[..., part] = hat_gradients(chart.shapes(uv))
+            self._weight[part] = 0
+        if self._air:
             value = self.value(self.jacobian(uv))
             value = np.where(np.isfinite(value), value, 1.0)  # else the map is given up anyway
             weight = AIR * np.sqrt(value * np.maximum(value - self.least, _THIN))
-            counts = sum(chart.sums(chart.barrier) for chart, _ in air)
-            for chart, part in air:
+            counts = sum(chart.sums(chart.barrier) for chart, _ in self._air)
+            for chart, part in self._air:
                 self._weight[part] = chart.barrier * self._at(weight / np.maximum(counts, 1), chart)
 
     def _at(self, values, chart):

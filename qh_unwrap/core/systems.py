@@ -17,8 +17,7 @@ from .triangles import parts
 
 _STEPS = 100  # of conjugate gradients, at most
 # Of one piece; islands that go together with others have fewer unknowns.
-_LARGE = 4000  # unknowns, from which on preconditioners are in single precision
-_HUGE = 30_000  # unknowns, from which on it pays to correct solutions in single precision, and to try old factors first
+_LARGE = 30_000  # unknowns, from which on single precision pays, and old factors are tried first
 _PATIENCE = 7  # steps of conjugate gradients that an old factorization may take
 
 
@@ -109,6 +108,7 @@ class Pattern:
             pattern = coo_array((entry, where), shape=(size, size)).tocsc()
             self._entry, self.indices, self.indptr = pattern.data, pattern.indices, pattern.indptr
         nothing = np.empty(len(self.indices))
+        self._places: tuple[np.ndarray, np.ndarray] | None = None  # of entries in blocks, and which are to be turned
         self._empty = csc_array((nothing, self.indices, self.indptr), shape=(self.size, self.size))
 
     def matrix(self, forward: np.ndarray, backward: np.ndarray, diagonal: np.ndarray) -> csc_array:
@@ -133,13 +133,14 @@ class Pattern:
             blocks, shape = np.empty((len(self._entry), 2, 2)), (2 * self.size, 2 * self.size)
             earlier = bsr_array((blocks, self.indices, self.indptr), shape=shape)
         blocks = earlier.data
+        if self._places is None:
+            ahead = self._entry < k
+            self._places = np.where(ahead, self._entry, self._entry - k), ahead
         for part in parts(len(self._entry)):
-            entry, block = self._entry[part], blocks[part]
-            ahead = entry < k
-            place = np.where(ahead, entry, entry - k)
+            place, ahead, block = *(each[part] for each in self._places), blocks[part]
             m, d, s, a = (row[place] for row in rows)
             # The pattern is by columns, and what stands there is taken for rows: transpose.
-            a = np.where(ahead, -a, a)
+            np.negative(a, out=a, where=ahead)
             block[:, 0, 0], block[:, 1, 1] = m + d, m - d
             block[:, 0, 1], block[:, 1, 0] = s - a, s + a
         return earlier
@@ -223,7 +224,7 @@ class Constrained:
         n = len(self._order)
         diagonal = self.diagonal(weights)
         solvers = [
-            self._factorizer(pattern.matrix(-weights[0], -weights[1], diagonal), self._is_alone(_HUGE))
+            self._factorizer(pattern.matrix(-weights[0], -weights[1], diagonal), self._is_alone(_LARGE))
             if pattern.size
             else None
             for pattern in self.patterns
@@ -279,7 +280,7 @@ class Constrained:
             sharper = [factors.sharpened() for factors in self._mean] if missed else []
             if any(sharper):
                 solution, _ = self._conjugate_gradients(hessian, rhs, np.zeros_like(rhs), residual, _STEPS)
-            if tried or not self._is_alone(_HUGE):
+            if tried or not self._is_alone(_LARGE):
                 self._mean = None
         self._scattered(solution, direction)
         return direction

@@ -5,7 +5,8 @@
 
 Seconds are the processor's, of one thread, so that they depend little on what else the machine does.  The parts are
 `charts` (every chart of QH_MESHES), `small` (hills of 250 and of 1 000 triangles), `horse`, `ribbons` (strips of quads
-that wind up a helix) and `waits` (how long the core lets nobody be heard).  Energies are symmetric Dirichlet's.
+that wind up a helix), `waits` (how long the core lets nobody be heard) and `mirrored` (how far the maps of charts are
+from those of what they look like in a mirror).  Energies are symmetric Dirichlet's.
 """
 
 import argparse
@@ -20,6 +21,9 @@ from statistics import median
 
 import numpy as np
 
+from qh_unwrap.core import unwrap
+
+from ..core.shapes import furthest_apart
 from .common import Verdicts, find_mesh, load_mesh, paths_in, table
 from .generated import hills
 from .measuring import outline
@@ -122,10 +126,27 @@ def beside(meshes, arguments, verdicts):
     return ratios
 
 
+def disks():
+    """The charts of QH_MESHES that are no closed models, by name."""
+    meshes = {path.stem: load_mesh(path) for path in (*paths_in("charts"), *paths_in("disk"))}
+    return {name: mesh for name, mesh in meshes.items() if len(outline(mesh[1]))}
+
+
 def charts(arguments, verdicts):
-    paths = [*paths_in("charts"), *paths_in("disk")]
-    meshes = {path.stem: load_mesh(path) for path in paths}
-    beside({name: mesh for name, mesh in meshes.items() if len(outline(mesh[1]))}, arguments, verdicts)
+    beside(disks(), arguments, verdicts)
+
+
+def mirrored(_arguments, verdicts):
+    rows = []
+    for name, (vertices, triangles) in disks().items():
+        one = unwrap(vertices, triangles)
+        other = unwrap(vertices * [-1, 1, 1], triangles[:, ::-1])
+        apart = furthest_apart(one.uv, other.uv * [-1, 1])
+        rows.append((name, len(triangles), one.report.iterations, other.report.iterations, f"{apart:.1e}", apart))
+    table(("mesh", "triangles", "steps", "mirrored", "apart"), [row[:-1] for row in rows])
+    worst = max(rows, key=lambda row: row[-1])
+    text = "what is mirrored ends within 1e-4 of the mirror image, by the map's extent"
+    verdicts.claim(text, worst[-1] <= 1e-4, f"at most {worst[-1]:.1e}, {worst[0]}")
 
 
 def small(arguments, verdicts):
@@ -172,7 +193,7 @@ def ribbon(count):
     return vertices, np.concatenate([np.column_stack([k, k + 2, k + 3]), np.column_stack([k, k + 3, k + 1])])
 
 
-PARTS = {part.__name__: part for part in (charts, small, horse, ribbons, waits)}
+PARTS = {part.__name__: part for part in (charts, small, horse, ribbons, waits, mirrored)}
 
 
 def main():

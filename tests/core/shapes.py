@@ -156,3 +156,10 @@ def rotation(seed):
     q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
     return q * np.linalg.det(q)
+
+
+def furthest_apart(one, other):
+    """The largest distance of points (n, 2) that are moved, turned and scaled so that they lie as near as can be, by
+    their extent."""
+    a, b = (uv @ [1, 1j] - (uv @ [1, 1j]).mean() for uv in (one, other))
+    return np.abs(a - np.vdot(b, a) / np.vdot(b, b) * b).max() / np.ptp(one, axis=0).max()

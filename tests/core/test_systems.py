@@ -217,7 +217,7 @@ def test_every_piece_is_solved_to_its_own_residual():
 
 
 def test_an_earlier_factorization_serves_or_is_replaced(monkeypatch):
-    monkeypatch.setattr(systems, "_HUGE", 0)
+    monkeypatch.setattr(systems, "_LARGE", 0)
     surface = Surface(*shapes.bump(2))
     n = len(surface.vertices)
     rng = np.random.default_rng(2)
@@ -238,7 +238,7 @@ def test_an_earlier_factorization_serves_or_is_replaced(monkeypatch):
 
 @pytest.mark.parametrize("hanging", [1.0, 1e-8])
 def test_single_precision_gives_the_same_solutions_as_double(monkeypatch, hanging):
-    monkeypatch.setattr(systems, "_HUGE", 0)
+    monkeypatch.setattr(systems, "_LARGE", 0)
     surface = Surface(*shapes.bump(4))
     n = len(surface.vertices)
     held = np.arange(n) == 7
