@@ -55,8 +55,10 @@ def make_air(
     angle = 2 * np.pi * np.arange(_CIRCLE) / _CIRCLE
     circle = centre + _RADIUS * radius * np.column_stack([np.cos(angle), np.sin(angle)]) @ axes
     built, wall_sides = _walls(start, walls, centre, radius)
-    seen = ((each - centre) @ axes.T for each in (start, end, np.vstack([start, built])[wall_sides]))
-    between = centre + _graded_points(*seen, radius) @ axes
+    from_start, to_end, within = (
+        (each - centre) @ axes.T for each in (start, end, np.vstack([start, built])[wall_sides])
+    )
+    between = centre + _graded_points(from_start, to_end, within, radius) @ axes
 
     place = np.empty(len(uv), dtype=np.int64)
     place[outline] = np.arange(len(outline))
