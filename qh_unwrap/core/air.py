@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from .certificate import orientation
 from .errors import BoundaryError
+from .loops import followers
 from .pieces import components
 from .triangles import corners_of, signed_areas
 
@@ -46,7 +47,7 @@ def make_air(
     """
     outline = np.concatenate(loops)
     start = uv[outline]
-    following = np.concatenate([np.roll(loop, -1) for loop in loops])
+    following = followers(loops)
     end = uv[following]
     centre, axes = _frame(start, end)
     radius = np.linalg.norm(start - centre, axis=1).max()
@@ -208,7 +209,7 @@ def _outside(triangles, sides, n):
     owner = np.tile(np.arange(m), 3)
     forward, backward = sides @ [n, 1], sides @ [1, n]
     key = start * n + end
-    with_side, against_side = np.isin(key, forward), np.isin(key, backward)
+    with_side, against_side = (_among(key, np.sort(wanted)) for wanted in (forward, backward))
     edge = np.minimum(start, end) * n + np.maximum(start, end)
     inner = np.flatnonzero(~with_side & ~against_side)
     inner = inner[np.argsort(edge[inner], kind="stable")]
@@ -219,6 +220,11 @@ def _outside(triangles, sides, n):
     if against_side.sum() != len(sides) or outside[owner[with_side]].any():
         return None
     return triangles[outside]
+
+
+def _among(values, numbers):
+    """Which of the values are among the sorted numbers."""
+    return numbers[np.minimum(np.searchsorted(numbers, values), len(numbers) - 1)] == values
 
 
 def quality(corners: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from .certificate import as_stored, near_boxes, turn
+from .loops import followers
 from .pieces import components
 
 
@@ -29,7 +30,7 @@ def touches_along_seams_only(uv: np.ndarray, loops: Sequence[np.ndarray], place:
     # winds around a place either once or never, and where only one of them winds counter-clockwise, so do all together:
     # never less than 0, since no triangle is flipped.
     start = np.concatenate(loops)
-    end = np.concatenate([np.roll(loop, -1) for loop in loops])
+    end = followers(loops)
     points, spot = np.unique(as_stored(uv[start]) + 0.0, axis=0, return_inverse=True)  # -0.0 is 0.0
     spot_of = np.empty(len(uv), dtype=np.intp)
     spot_of[start] = spot.ravel()

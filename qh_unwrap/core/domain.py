@@ -290,11 +290,14 @@ class Plane:
         self.island, self._fixed, self._triangulate, self._walls = island, fixed, triangulate, walls
         self._take(list(airs), uv)
 
-    def _take(self, airs, uv):
+    def _take(self, airs, uv, kept=None):
+        """Go on with `airs` around the map `uv`, of which those of the pieces in `kept` (p,) bool are as they were."""
         self._airs = airs
         n, p = len(self.island.vertices), self.island.piece_count
         counts = np.array([len(air.points) for air in airs])
         starts = n + np.cumsum(counts) - counts
+        order = None if kept is None or self.island.dissection is not None else self._order_of(kept, starts)
+        self._air_starts = starts
         sizes = np.diff(self.island.vertex_starts, append=n)
         triangles = [
             np.where(air.triangles < size, air.triangles + first, air.triangles - size + start)
@@ -307,8 +310,25 @@ class Plane:
         self.triangles = Triangles(self.charts, n + int(counts.sum()))
         everything = self.start(uv)
         fixed = self._fixed.followed_by(np.concatenate([air.on_circle for air in airs]), everything[n:])
-        self.constrained = Constrained(self._order(everything), self.triangles.edges, *fixed, group=self.vertex_piece)
+        order = self._order(everything) if order is None else np.concatenate([order, self._local_order(~kept)])
+        self.constrained = Constrained(order, self.triangles.edges, *fixed, group=self.vertex_piece)
         self._quality = quality(corners_of(everything, self._air.triangles))
+
+    def _order_of(self, pieces, starts):
+        """The order in which the vertices of some `pieces` (p,) bool are eliminated, as they will be numbered when the
+        pieces' air begins with the numbers `starts` (p,)."""
+        order = self.constrained.order
+        order = order[pieces[self.vertex_piece[order]]]
+        shift = (starts - self._air_starts)[self.vertex_piece[order]]
+        return order + np.where(order < len(self.island.vertices), 0, shift)
+
+    def _local_order(self, pieces):
+        """A new order for the vertices of some `pieces` (p,) bool."""
+        chosen = pieces[self.vertex_piece]
+        rows, number = np.flatnonzero(chosen), np.cumsum(chosen) - 1
+        edges = self.triangles.edges
+        edges = number[edges[chosen[edges[:, 0]]]]
+        return rows[local_order(len(rows), edges, self.vertex_piece[rows])]
 
     def _order(self, uv):
         """The order in which to eliminate the vertices; where it is by dissection, that of the island serves on."""
@@ -357,7 +377,7 @@ class Plane:
         kept = ~pieces | failed
         airs = [self._as_it_lies(k, uv) if kept[k] else made[k] for k in range(len(kept))]
         old_quality, old_piece = self._quality, self._air.piece
-        self._take(airs, uv)
+        self._take(airs, uv, kept)
         self._quality[kept[self._air.piece]] = old_quality[kept[old_piece]]  # that of when it was made
         return self.start(uv), failed
 

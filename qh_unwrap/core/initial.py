@@ -6,6 +6,7 @@ from scipy.interpolate import RBFInterpolator
 
 from .chart import Surface
 from .domain import Fixed, Held
+from .loops import followers
 from .pieces import starts_of
 from .triangles import corners_of, normals, sums_by_parts
 from .weights import cotangent, mean_value, uniform
@@ -116,7 +117,7 @@ def conformal(surface: Surface) -> np.ndarray:
 
     direction = np.cumsum(np.pi - angle_sums[loop] + flux[loop])  # of the side that follows each vertex
     along = np.column_stack([np.cos(direction), np.sin(direction)])
-    following = np.concatenate([np.roll(outline, -1) for outline in surface.outlines])
+    following = followers(surface.outlines)
     length = np.linalg.norm(surface.vertices[following] - surface.vertices[loop], axis=1)
     # Close every outline by the least change of its lengths.
     gap = np.add.reduceat(length[:, None] * along, starts)

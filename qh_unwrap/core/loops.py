@@ -1,9 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Boundary loops: which of them is a piece's outline, and how long closed polygons are."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from .pieces import starts_of
 from .topology import Topology
+
+
+def followers(loops: Sequence[np.ndarray]) -> np.ndarray:
+    """The vertex that follows each of all closed loops' vertices, which are taken loop after loop."""
+    loop, first = np.concatenate(loops), starts_of(loops)
+    result = np.roll(loop, -1)
+    result[np.append(first[1:], len(loop)) - 1] = loop[first]
+    return result
 
 
 def sorted_loops(vertices: np.ndarray, topology: Topology) -> tuple[list[np.ndarray], np.ndarray]:

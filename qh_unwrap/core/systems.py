@@ -179,7 +179,7 @@ class Constrained:
         self.patterns = [Pattern(unknowns, edges) for unknowns in self.unknowns]
         self.held = np.column_stack([self.unknowns[0].held, self.unknowns[-1].held])
         self.values = values
-        self._order, self._factorizer = order, factorizer
+        self.order, self._factorizer = order, factorizer
         self._group = None if group is None or not len(group) or (group == group[0]).all() else group
         self._mean: list[Factors] | None = None
         self._matrix: bsr_array | None = None
@@ -190,7 +190,7 @@ class Constrained:
         if partner is None and not any(one.tied for one in self.unknowns) and np.array_equal(held, self.held):
             self.values = values
             return self
-        return Constrained(self._order, self.edges, held, values, partner, self._group, self._factorizer)
+        return Constrained(self.order, self.edges, held, values, partner, self._group, self._factorizer)
 
     def _is_alone(self, size):
         """Whether there is one piece only, of that many unknowns: what suits large ones must not depend on company."""
@@ -209,7 +209,7 @@ class Constrained:
     def diagonal(self, weights: np.ndarray) -> np.ndarray:
         """The sum of the weights (2, k) around every vertex, (n,)."""
         i, j = self.edges.T
-        n = len(self._order)
+        n = len(self.order)
         return np.bincount(i, weights[0], n) + np.bincount(j, weights[1], n)
 
     def solve(self, weights: np.ndarray) -> np.ndarray:
@@ -221,7 +221,7 @@ class Constrained:
         `sum_j w_ij (f_i - f_j) = g_i` for all vertices (n, c).
         """
         i, j = self.edges.T
-        n = len(self._order)
+        n = len(self.order)
         diagonal = self.diagonal(weights)
         solvers = [
             self._factorizer(pattern.matrix(-weights[0], -weights[1], diagonal), self._is_alone(_LARGE))
@@ -308,14 +308,14 @@ class Constrained:
             return lambda values: (matrix @ values.ravel()).reshape(values.shape)
         # What is not free in both coordinates alike has no blocks: multiply with those of all vertices.
         if self._all is None:
-            self._all = Pattern(Unknowns(self._order, np.zeros(len(self._order), bool)), self.edges)
+            self._all = Pattern(Unknowns(self.order, np.zeros(len(self.order), bool)), self.edges)
         matrix = self._matrix = self._all.block_matrix(beside, own, self._matrix)
 
         def product(values):
-            moved = np.zeros((len(self._order), 2))
+            moved = np.zeros((len(self.order), 2))
             self._scattered(values, moved)
             force = np.empty_like(moved)
-            force[self._order] = (matrix @ moved[self._order].ravel()).reshape(-1, 2)
+            force[self.order] = (matrix @ moved[self.order].ravel()).reshape(-1, 2)
             if self.alike:
                 return self.unknowns[0].gathered(force)
             return np.concatenate([self.unknowns[c].gathered(force[:, c]) for c in (0, 1)])[:, None]
