@@ -7,6 +7,7 @@ from qh_unwrap.core.air import _within, make_air
 from qh_unwrap.core.certificate import is_injective
 from qh_unwrap.core.delaunay import triangulate
 from qh_unwrap.core.domain import Fixed, Plane, airs_around
+from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.triangles import signed_areas
 from qh_unwrap.core.weights import scheme
 
@@ -201,3 +202,31 @@ def test_the_weights_of_an_isometry_need_no_balance():
     np.testing.assert_allclose(
         plane.weights(weights, plane.start(uv)), plane.triangles.joined(weights), rtol=1e-9, atol=1e-12
     )
+
+
+@pytest.mark.parametrize(
+    "renewed", [[True, False, False], [False, True, False], [True, False, True], [True, True, True]]
+)
+def test_new_air_around_some_pieces_leaves_the_order_of_the_others(renewed):
+    renewed = np.array(renewed)
+    meshes = [shapes.bump(k, inner=60 * (k + 1), outer=20 + 4 * k) for k in range(3)]
+    surface = Surface(*joined(*zip(*meshes, strict=True)))
+    uv = surface.vertices[:, :2] * (1 + 0.2 * surface.vertex_piece[:, None])
+    fixed = Fixed(np.zeros(uv.shape, bool), uv)
+    plane = Plane(surface, uv, fixed, airs_around(surface, uv, triangulate), triangulate)
+    before = plane.constrained.order, plane.vertex_piece
+    moved = plane.start(uv)
+    moved[: len(uv)] *= 1 + 0.1 * np.sin(3 * moved[: len(uv), ::-1])
+    everything, failed = plane.recalled(moved, moved[: len(uv)], renewed)
+    assert not failed.any()
+    order, piece = plane.constrained.order, plane.vertex_piece
+    assert (np.sort(order) == np.arange(len(everything))).all()
+    for k in np.flatnonzero(~renewed):
+        one, other = (its[whose[its] == k] for its, whose in (before, (order, piece)))
+        inner = one < len(uv)
+        assert len(one) == len(other) and (one[inner] == other[inner]).all(), "its own vertices keep their numbers"
+        assert (np.diff(one[~inner] - other[~inner]) == 0).all(), "those of its air are all moved on alike"
+    weights = plane.weights(scheme(Settings(balance=0.25))(plane.charts, everything), everything)
+    fresh = Plane(surface, everything[: len(uv)], fixed, plane._airs, triangulate)
+    found, expected = (each.constrained.solve(weights) for each in (plane, fresh))
+    np.testing.assert_allclose(found, expected, atol=1e-9)
