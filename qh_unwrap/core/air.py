@@ -35,6 +35,7 @@ class Air(NamedTuple):
     points: np.ndarray  # (a, 2), its own vertices, numbered after the island's
     on_circle: np.ndarray  # (a,) bool, those on the circle that ends it, and on walls: they stay
     triangles: np.ndarray  # (t, 3), all positive
+    left_out: np.ndarray  # (u, 3), those beside them that are too flat or too small for that
 
 
 def make_air(
@@ -81,10 +82,11 @@ def make_air(
     added = len(built) + len(between) + _CIRCLE
     number = np.concatenate([outline, len(uv) + np.arange(added)])
     points, triangles = points[len(outline) :], number[triangles]
-    # Where the outline is all but straight, triangles may be inside out by rounding: they decide nothing.
+    # Where the outline is all but straight, or a hole too small for single precision, triangles may be inside out by
+    # rounding: they decide nothing as long as that is so.
     solid = orientation(np.vstack([uv, points]), triangles) > 0
     number = np.arange(added)
-    return Air(points, (number < len(built)) | (number >= added - _CIRCLE), triangles[solid])
+    return Air(points, (number < len(built)) | (number >= added - _CIRCLE), triangles[solid], triangles[~solid])
 
 
 def _frame(start, end):

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .air import Air, Triangulator, make_air, quality
+from .certificate import orientation
 from .chart import Chart, Surface, air_chart
 from .ordering import elimination_order, local_order
 from .settings import Settings
@@ -22,7 +23,9 @@ from .systems import Constrained
 from .triangles import corners_of, signed_areas
 
 _WORN = 0.05  # air is renewed when a triangle keeps less than this part of its quality,
-_IN_THE_WAY = 0.2  # or less than this where it may be what keeps steps short
+_IN_THE_WAY = 0.2  # or less than this where it may be what keeps steps short, or when one that was left out
+_OPEN = 1e-3  # has come to this quality, and is
+_GROWN = 0.05  # times as large as it would be without distortion
 
 
 Walls = Sequence[np.ndarray | None] | None
@@ -299,13 +302,19 @@ class Plane:
         order = None if kept is None or self.island.dissection is not None else self._order_of(kept, starts)
         self._air_starts = starts
         sizes = np.diff(self.island.vertex_starts, append=n)
-        triangles = [
-            np.where(air.triangles < size, air.triangles + first, air.triangles - size + start)
-            for air, size, first, start in zip(airs, sizes, self.island.vertex_starts, starts, strict=True)
-        ]
+        numbering = list(zip(sizes, self.island.vertex_starts, starts, strict=True))
+
+        def numbered(triangles):
+            joined = [
+                np.where(each < size, each + first, each - size + start)
+                for each, (size, first, start) in zip(triangles, numbering, strict=True)
+            ]
+            return np.concatenate(joined), np.repeat(np.arange(p), [len(each) for each in joined])
+
         self.vertex_piece = np.concatenate([self.island.vertex_piece, np.repeat(np.arange(p), counts)])
-        piece = np.repeat(np.arange(p), [len(each) for each in triangles])
-        self._air = air_chart(np.concatenate(triangles), n + counts.sum(), piece, p)
+        triangles, piece = numbered([air.triangles for air in airs])
+        self._air = air_chart(triangles, n + counts.sum(), piece, p)
+        self._left_out = numbered([air.left_out for air in airs])
         self.charts = [self.island, self._air]
         self.triangles = Triangles(self.charts, n + int(counts.sum()))
         everything = self.start(uv)
@@ -359,7 +368,24 @@ class Plane:
         least = np.where(hindered, _IN_THE_WAY, _WORN)
         least = least[self._air.piece] if least.ndim else least
         worn[self._air.piece[~(now > least * self._quality)]] = True
+        worn |= self._opened(uv)
         return self._remade(uv, worn)[0] if worn.any() else uv
+
+    def _opened(self, uv):
+        """The pieces (p,) bool in which what air was left out of has opened, and must not be left empty.
+
+        A hole that the start has drawn together is let grow first: it would be held back.
+        """
+        result = np.zeros(self.island.piece_count, bool)
+        gaps, piece = self._left_out
+        opened = (quality(corners_of(uv, gaps)) > _OPEN) & (orientation(uv, gaps) > 0)
+        if opened.any():
+            gaps, piece = gaps[opened], piece[opened]
+            size = np.sqrt(np.abs(self.island.sums(signed_areas(corners_of(uv, self.island.triangles)))))
+            on_rim = (gaps < len(self.island.vertices)).all(axis=1)
+            true = _around(self.island.vertices, np.where(on_rim[:, None], gaps, 0))
+            result[piece[_around(uv, gaps) >= _GROWN * size[piece] * true]] = True
+        return result
 
     def recalled(self, uv: np.ndarray, earlier: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         chosen = pieces[self.island.vertex_piece][:, None]
@@ -411,6 +437,12 @@ class Plane:
         )
         smaller._quality = self._quality[pieces[self._air.piece]]
         return smaller, uv[pieces[self.vertex_piece]]
+
+
+def _around(points, triangles):
+    """The perimeters (t,) of triangles (t, 3) of points (n, d)."""
+    corners = points[triangles]
+    return np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).sum(axis=1)
 
 
 def airs_around(

@@ -37,7 +37,7 @@ def test_air_fills_the_plane_outside_and_in_holes():
     vertices, triangles = shapes.ring(24, 3)
     surface = Surface(vertices, triangles)
     uv = vertices[:, :2]
-    points, on_circle, air = make_air(uv, surface.loops, triangulate)
+    points, on_circle, air, _ = make_air(uv, surface.loops, triangulate)
     everything = np.vstack([uv, points])
     areas = signed_areas(everything[air])
     assert (areas > 0).all() and len(air) < 1500
@@ -230,3 +230,18 @@ def test_new_air_around_some_pieces_leaves_the_order_of_the_others(renewed):
     fresh = Plane(surface, everything[: len(uv)], fixed, plane._airs, triangulate)
     found, expected = (each.constrained.solve(weights) for each in (plane, fresh))
     np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("radius", [0.33, 0.25, 0.15])
+def test_a_hole_that_grows_from_nothing_does_not_cross_itself(radius):
+    # a torus cut along one ring: its start draws the inner end together until single precision sees nothing of it
+    around, across = 48, 12
+    a, b = 2 * np.pi * np.arange(around + 1)[:, None] / around, 2 * np.pi * np.arange(across) / across
+    out = 1 + radius * np.cos(b)
+    vertices = np.stack([out * np.cos(a), out * np.sin(a), radius * np.sin(b) + 0 * a], axis=2).reshape(-1, 3)
+    k, j = np.divmod(np.arange(around * across), across)
+    corner, beside = k * across + j, k * across + (j + 1) % across
+    halves = [corner, corner + across, beside + across], [corner, beside + across, beside]
+    result = free(vertices, np.concatenate([np.column_stack(half) for half in halves]))
+    assert result.report.injective and result.report.after.flips == 0
+    assert result.report.after.symmetric_dirichlet < 16

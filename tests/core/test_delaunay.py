@@ -131,7 +131,7 @@ def test_thousands_of_sides_are_missing_at_first_in_a_spiral():
 
 def test_air_is_made_without_blender():
     uv = star(60, 1) + 3
-    points, on_circle, triangles = make_air(uv, [np.arange(60)], triangulate)
+    points, on_circle, triangles, _ = make_air(uv, [np.arange(60)], triangulate)
     everything = np.vstack([uv, points])
     assert (turn(*everything[triangles.T]) > 0).all() and on_circle.sum() == 48
     assert make_air(uv[[1, 0, *range(2, 60)]], [np.arange(60)], triangulate) is None

@@ -33,7 +33,7 @@ def test_the_air_has_the_walls_as_sides_and_their_ends_stay():
     uv = shapes.grid(4, 4)[0][:, :2]
     loop = np.array([0, 1, 2, 3, 4, 9, 14, 19, 24, 23, 22, 21, 20, 15, 10, 5])
     walls = segments([1.2, -0.2, 1.2, 0.6], [1.2, 0.6, 1.5, 0.7])
-    points, stays, air = make_air(uv, [loop], triangulate, walls)
+    points, stays, air, _ = make_air(uv, [loop], triangulate, walls)
     assert stays[-48:].all()
     everything = np.vstack([uv, points])
     assert (orientation(everything, air) > 0).all()
