@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from .certificate import orientation
 from .errors import BoundaryError
 from .loops import followers
-from .pieces import components
+from .pieces import among, components
 from .triangles import corners_of, signed_areas
 
 Triangulator = Callable[[np.ndarray, np.ndarray], np.ndarray | None]
@@ -211,7 +211,7 @@ def _outside(triangles, sides, n):
     owner = np.tile(np.arange(m), 3)
     forward, backward = sides @ [n, 1], sides @ [1, n]
     key = start * n + end
-    with_side, against_side = (_among(key, np.sort(wanted)) for wanted in (forward, backward))
+    with_side, against_side = (among(key, np.sort(wanted)) for wanted in (forward, backward))
     edge = np.minimum(start, end) * n + np.maximum(start, end)
     inner = np.flatnonzero(~with_side & ~against_side)
     inner = inner[np.argsort(edge[inner], kind="stable")]
@@ -222,11 +222,6 @@ def _outside(triangles, sides, n):
     if against_side.sum() != len(sides) or outside[owner[with_side]].any():
         return None
     return triangles[outside]
-
-
-def _among(values, numbers):
-    """Which of the values are among the sorted numbers."""
-    return numbers[np.minimum(np.searchsorted(numbers, values), len(numbers) - 1)] == values
 
 
 def quality(corners: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay, QhullError
 
 from .certificate import turn, turn_of_whole_numbers
+from .pieces import among
 
 _JOGGLE = 1e-11  # how far Qhull's points are moved, relative to their extent: many on one circle would take it longer
 _ROUNDING = 1e-15  # largest rounding error of `turn`, relative to its terms (Shewchuk 1997, with a margin)
@@ -140,9 +141,7 @@ class _Edges:
 
     def contain(self, sides: np.ndarray) -> np.ndarray:
         """Which of the sides (s, 2) are edges, (s,) bool."""
-        number = self._numbers(*sides.T)
-        place = np.searchsorted(self._sorted, number)
-        return self._sorted[np.minimum(place, len(self._sorted) - 1)] == number
+        return among(self._numbers(*sides.T), self._sorted)
 
     def fill_the_hull(self, points: np.ndarray) -> bool:
         """Whether the triangles are positive, and cover the convex hull of all points once: exactly.

@@ -299,7 +299,7 @@ class Plane:
         n, p = len(self.island.vertices), self.island.piece_count
         counts = np.array([len(air.points) for air in airs])
         starts = n + np.cumsum(counts) - counts
-        order = None if kept is None or self.island.dissection is not None else self._order_of(kept, starts)
+        order = np.empty(0, np.int64) if kept is None else self._order_of(kept, starts)
         self._air_starts = starts
         sizes = np.diff(self.island.vertex_starts, append=n)
         numbering = list(zip(sizes, self.island.vertex_starts, starts, strict=True))
@@ -319,7 +319,7 @@ class Plane:
         self.triangles = Triangles(self.charts, n + int(counts.sum()))
         everything = self.start(uv)
         fixed = self._fixed.followed_by(np.concatenate([air.on_circle for air in airs]), everything[n:])
-        order = self._order(everything) if order is None else np.concatenate([order, self._local_order(~kept)])
+        order = self._order(everything, order, np.ones(p, bool) if kept is None else ~kept)
         self.constrained = Constrained(order, self.triangles.edges, *fixed, group=self.vertex_piece)
         self._quality = quality(corners_of(everything, self._air.triangles))
 
@@ -331,26 +331,22 @@ class Plane:
         shift = (starts - self._air_starts)[self.vertex_piece[order]]
         return order + np.where(order < len(self.island.vertices), 0, shift)
 
-    def _local_order(self, pieces):
-        """A new order for the vertices of some `pieces` (p,) bool."""
-        chosen = pieces[self.vertex_piece]
-        rows, number = np.flatnonzero(chosen), np.cumsum(chosen) - 1
-        edges = self.triangles.edges
-        edges = number[edges[chosen[edges[:, 0]]]]
-        return rows[local_order(len(rows), edges, self.vertex_piece[rows])]
-
-    def _order(self, uv):
-        """The order in which to eliminate the vertices; where it is by dissection, that of the island serves on."""
-        n, dissection = len(self.island.vertices), self.island.dissection
+    def _order(self, uv, first, pieces):
+        """The order in which to eliminate the vertices: the `first` ones, and then those of the other `pieces` (p,)
+        bool; where it is by dissection, that of the island serves on."""
+        n, dissection, edges = len(self.island.vertices), self.island.dissection, self.triangles.edges
         if dissection is None:
-            return local_order(len(uv), self.triangles.edges, self.vertex_piece)
+            chosen = pieces[self.vertex_piece]
+            rows, number = np.flatnonzero(chosen), np.cumsum(chosen) - 1
+            edges = number[edges[chosen[edges[:, 0]]]]
+            return np.concatenate([first, rows[local_order(len(rows), edges, self.vertex_piece[rows])]])
         # Air is taken apart like the outline beside it.
         outline = np.unique(np.concatenate(self.island.loops))
         inner = outline[~dissection.separates(dissection.key[outline])]
         beside = inner if len(inner) else outline
         shift = 4 * np.ptp(uv, axis=0).max() * self.vertex_piece[:, None]  # no piece lies beside another
         like = beside[cKDTree((uv + shift)[beside]).query((uv + shift)[n:])[1]]
-        return dissection.extended(like, self.triangles.edges[(self.triangles.edges >= n).any(axis=1)]).order
+        return dissection.extended(like, edges[(edges >= n).any(axis=1)]).order
 
     def fix(self, fixed: Fixed, uv: np.ndarray) -> None:
         n = len(fixed.held)

@@ -23,6 +23,11 @@ def starts_of_numbers(number: np.ndarray, count: int) -> np.ndarray:
     return np.searchsorted(number, np.arange(count))
 
 
+def among(values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Which of the values (k,) are among the sorted `numbers` (m,), of which there is one at least, (k,) bool."""
+    return numbers[np.minimum(np.searchsorted(numbers, values), len(numbers) - 1)] == values
+
+
 def around_faces(face_start: np.ndarray, corner_count: int) -> tuple[np.ndarray, np.ndarray]:
     """The face of each corner, (c,), and the corner that follows it around that face, (c,).
 

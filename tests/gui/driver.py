@@ -15,7 +15,7 @@ from everything_in_file import differences, everything
 def steps(gui):
     gui.workspace("UV Editing")
     yield 1
-    _add(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
+    put_alone(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
     show_checker(gui)
     bpy.ops.ed.undo_push(message="Checker")
     yield 2
@@ -118,7 +118,7 @@ def _sidebars(gui):
 
 def _reports(gui):
     """What goes wrong is said."""
-    _add(gui, bpy.ops.mesh.primitive_cube_add, lambda one, other: False)
+    put_alone(gui, bpy.ops.mesh.primitive_cube_add, lambda one, other: False)
     yield 1
     gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Unwrap"]))
     yield 2
@@ -135,7 +135,7 @@ def _reports(gui):
 def _troubles(gui):
     """A mesh with many kinds of trouble: the panel leads to each."""
     gui.area('INFO').type = 'IMAGE_EDITOR'
-    _add(gui, _troubled, lambda one, other: False)
+    put_alone(gui, _troubled, lambda one, other: False)
     gui.sidebar('VIEW_3D', "QH Unwrap")
     yield 1
     for below_top in (
@@ -161,7 +161,7 @@ def _troubles(gui):
 def _seams(gui):
     """Seams are marked, and the islands that they make are laid out anew."""
     gui.area('IMAGE_EDITOR').ui_type = 'UV'
-    _add(gui, bpy.ops.mesh.primitive_monkey_add, lambda one, other: False)
+    put_alone(gui, bpy.ops.mesh.primitive_monkey_add, lambda one, other: False)
     gui.click(*_button(gui, 'VIEW_3D', _BUTTONS["Unwrap"]))
     yield 2
     yield from _end(gui)
@@ -186,7 +186,7 @@ def _seams(gui):
 
 def _check(gui):
     """A check says what is wrong with UVs, changes nothing, and leads to the faces in both editors."""
-    _add(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
+    put_alone(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
     with gui.override('VIEW_3D'):
         bpy.ops.uv.smart_project(angle_limit=1.2)
     yield 1
@@ -207,7 +207,7 @@ def _check(gui):
 
 def _heatmap(gui):
     """It shows each quantity, follows the UVs, and leaves everything as it was."""
-    _add(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
+    put_alone(gui, bpy.ops.mesh.primitive_monkey_add, _is_seam)
     with gui.override('VIEW_3D'):
         bpy.ops.uv.unwrap(method='CONFORMAL', margin=0.01)
     yield 1
@@ -329,7 +329,7 @@ def _long_work(gui):
     """It shows how far it is; ESC, an error and another file end it, and leave nothing behind."""
     for area in (area for area in gui.window.screen.areas if area.type == 'VIEW_3D'):
         area.spaces.active.show_region_ui = False
-    _add(gui, _sheet(180), lambda one, other: False)
+    put_alone(gui, wavy_sheet(180), lambda one, other: False)
     yield 2
     yield from _begin(gui)
     yield from _end(gui)
@@ -341,7 +341,7 @@ def _long_work(gui):
     yield 2
     assert not uvs().any(), "it takes more than one step to undo"
 
-    _add(gui, _sheet(388), lambda one, other: False)
+    put_alone(gui, wavy_sheet(388), lambda one, other: False)
     yield 5
     yield from _begin(gui)
     for _ in range(4):  # until it is drawn without the menu
@@ -363,7 +363,7 @@ def _begin(gui):
     gui.key("q")
     for _ in range(100):
         yield 0.1
-        if _is_running(gui):
+        if is_running(gui):
             return
     raise AssertionError("it did not go on beside the window")
 
@@ -371,17 +371,17 @@ def _begin(gui):
 def _end(gui):
     for _ in range(600):
         yield 0.1
-        if not _is_running(gui):
+        if not is_running(gui):
             return
     raise AssertionError("it did not end")
 
 
-def _is_running(gui):
+def is_running(gui):
     running = {operator.bl_idname for operator in gui.window.modal_operators}
     return bool(running & {"UV_OT_qh_unwrap", "UV_OT_qh_seams", "UV_OT_qh_check", "UV_OT_qh_compare", "UV_OT_qh_plot"})
 
 
-def _sheet(size):
+def wavy_sheet(size):
     """Adds a wavy sheet of size x size quads."""
 
     def add(calc_uvs):
@@ -405,7 +405,7 @@ _BUTTONS = {
 _ADVANCED_BELOW_MESH = 546  # the same, where the section Mesh is open
 
 
-def _add(gui, add, is_seam):
+def put_alone(gui, add, is_seam):
     """Alone in the scene, in Edit Mode, all selected."""
     with gui.override('VIEW_3D'):
         if bpy.context.mode != 'OBJECT':
