@@ -110,7 +110,11 @@ def are_injective(
     polygons = [stored[loop] for loop in loops]
     # Triangles of positive area leave the outer loop counter-clockwise and the others clockwise, if all are simple.
     wrong |= np.bincount(loop_piece, enclosed_areas(polygons) > 0) != 1
-    return ~wrong & (crossings(polygons, loop_piece, touching=True) == 0)
+    for touching in _meeting(polygons, loop_piece, touching=True):
+        wrong[touching] = True
+        if wrong.all():  # thousands of sides may lie one over the other
+            break
+    return ~wrong
 
 
 def certified_pieces(surface: Surface, uv: np.ndarray) -> np.ndarray:
@@ -158,25 +162,29 @@ def count_crossings(polygons: Sequence[np.ndarray], touching: bool = False) -> i
 
 def crossings(polygons: Sequence[np.ndarray], group: np.ndarray, touching: bool = False) -> np.ndarray:
     """The same for every group of polygons, (g,); `group` (k,) is the number of each polygon's group."""
+    found = np.zeros(group.max() + 1, int)
+    for its in _meeting(polygons, group, touching):
+        found += np.bincount(its, minlength=len(found))
+    return found
+
+
+def _meeting(polygons, group, touching):
+    """Yield the groups of pairs of sides that cross, or also touch, (k,), some at a time."""
     start, following, first = _sides(polygons)
     end = start[following]
     group = np.repeat(group, np.diff(first, append=len(start)))
-
-    found = np.zeros(group.max() + 1, int)
+    if touching:  # sides that run back over the one before
+        back = end - start, end[following] - end
+        on_a_line = turn(start, end, end[following]) == 0
+        yield group[on_a_line & ((back[0] * back[1]).sum(axis=1) <= 0)]
     for one, other in near_boxes(np.minimum(start, end), np.maximum(start, end), group):
         a, b, c, d = start[one], end[one], start[other], end[other]
         across, back = turn(a, b, c) * turn(a, b, d), turn(c, d, a) * turn(c, d, b)
         if touching:
             neighbours = (following[one] == other) | (following[other] == one)
-            crossing = (across <= 0) & (back <= 0) & ~neighbours
+            yield group[one[(across <= 0) & (back <= 0) & ~neighbours]]
         else:
-            crossing = (across < 0) & (back < 0)
-        found += np.bincount(group[one[crossing]], minlength=len(found))
-    if touching:  # and sides that run back over the one before
-        back = end - start, end[following] - end
-        on_a_line = turn(start, end, end[following]) == 0
-        found += np.bincount(group[on_a_line & ((back[0] * back[1]).sum(axis=1) <= 0)], minlength=len(found))
-    return found
+            yield group[one[(across < 0) & (back < 0)]]
 
 
 def near_boxes(low: np.ndarray, high: np.ndarray, group: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -18,11 +18,12 @@ from .initial import conformal, fit, led, project, weighted_map
 from .rings import ring_map
 from .settings import Settings
 from .stepping import PART
+from .strips import strip_outlines
 from .triangles import corners_of, signed_areas
 from .unfolding import unfolded
 
 # The starts to choose from, the cheapest first, and the energy that needs no further one
-_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "MEAN_VALUE": 1e6, "RINGS": np.inf}
+_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "STRIP": 2, "MEAN_VALUE": 1e6, "RINGS": np.inf}
 # A surface bulges if its outline is so short: then neither its projection nor its conformal map is any good.
 _BULGING = 0.45  # of the squared outline, relative to that of a disk of the surface's area
 _TRACE = 1e-4  # of a surface's area, that flipped triangles may have for it to be as good as valid
@@ -37,11 +38,18 @@ def natural_start(surface: Surface, settings: Settings, initial: str) -> np.ndar
     n = len(surface.vertices)
     nothing = np.zeros(surface.piece_count, bool)
     circle = replace(settings, boundary="CIRCLE", weights="COTANGENT")
-    held, values, _, faults = held_outlines(surface, circle, np.zeros((n, 2)), nothing, np.zeros((n, 2), bool))
+    _, values, _, faults = held_outlines(surface, circle, np.zeros((n, 2)), nothing, np.zeros((n, 2), bool))
     for fault in faults.values():
         raise fault
+    return _within_outlines(surface, values, initial)
+
+
+def _within_outlines(surface, values, initial):
+    """The map `initial` (n, 2) with the pieces' outlines where `values` (n, 2) has them."""
+    held = np.zeros(values.shape, bool)
+    held[np.concatenate(surface.outlines)] = True
     domain = Held(surface, Fixed(held, values), surface.plugs(solid=True))
-    return _weighted_or_ring_map(domain, initial)[:n]
+    return _weighted_or_ring_map(domain, initial)[: len(values)]
 
 
 def _weighted_or_ring_map(domain, initial):
@@ -59,15 +67,22 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
     untried = undecided.copy()
     for initial, enough in _CANDIDATES.items():
         trying = undecided & ~bulging if initial in ("PROJECTION", "CONFORMAL") else undecided
+        if initial == "STRIP":
+            trying, straight = strip_outlines(surface, trying)
         if not trying.any():
             continue
         pieces = np.flatnonzero(trying)
+        rows = np.flatnonzero(trying[surface.vertex_piece])
         part = surface if trying.all() else surface.of(trying)
         if initial == "CONFORMAL":
             yield PART
             part.order  # noqa: B018 (it is kept)
             yield PART
-        uv, _ = unfolded(part, natural_start(part, settings, initial), np.zeros((len(part.vertices), 2), bool), _TRACE)
+        if initial == "STRIP":
+            uv = _within_outlines(part, straight[rows], "MEAN_VALUE")
+        else:
+            uv = natural_start(part, settings, initial)
+        uv, _ = unfolded(part, uv, np.zeros((len(part.vertices), 2), bool), _TRACE)
         value = energies(part, uv, settings.balance)
         # What could be better is worth the certificate.
         sure = (value < least[pieces]) | ~certified[pieces]
@@ -78,7 +93,6 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
         untried &= ~trying
         taken = pieces[better]
         least[taken], certified[taken] = value[better], sure[better]
-        rows = np.flatnonzero(trying[surface.vertex_piece])
         its = better[part.vertex_piece]
         start[rows[its]] = uv[its]
         undecided &= ~(certified & (least < enough))

@@ -92,3 +92,13 @@ def test_flips_and_holes_outside_are_not_certified():
     assert not is_injective(vertices[:, :2] * [-1, 1], triangles, surface.loops)
     inside_out = vertices[:, :2] / (vertices[:, :2] ** 2).sum(axis=1, keepdims=True)
     assert not is_injective(inside_out, triangles, surface.loops)
+
+
+def test_thousands_of_turns_over_one_another_are_no_injective_map():
+    angle = 2 * np.pi * np.arange(3000) / 20
+    turns = np.column_stack([np.cos(angle), np.sin(angle)])
+    wound = np.vstack([turns, 1.2 * turns[::-1]])
+    apart = np.vstack([angle, 0 * angle]).T, np.vstack([angle, 0 * angle + 1]).T[::-1]
+    for outline, expected in ((wound, False), (np.vstack(apart), True)):
+        outline = outline[:: 1 if enclosed_area(outline) > 0 else -1]
+        assert is_injective(outline, np.empty((0, 3), int), [np.arange(len(outline))]) == expected
