@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _CROWDED = 30  # pairs that lie side by side for each box, from which on strips pay
 _MOST = 1_000_000  # strips of all groups, that rounding can tell apart
-_PORTION = 1_000_000  # pairs of boxes that are looked at together, about: it bounds the memory
+_PORTION = 100_000  # pairs of boxes that are looked at together, about: it bounds the memory
 
 
 def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -110,11 +110,7 @@ def are_injective(
     polygons = [stored[loop] for loop in loops]
     # Triangles of positive area leave the outer loop counter-clockwise and the others clockwise, if all are simple.
     wrong |= np.bincount(loop_piece, enclosed_areas(polygons) > 0) != 1
-    for touching in _meeting(polygons, loop_piece, touching=True):
-        wrong[touching] = True
-        if wrong.all():  # thousands of sides may lie one over the other
-            break
-    return ~wrong
+    return ~are_crossed(polygons, loop_piece, wrong)
 
 
 def certified_pieces(surface: Surface, uv: np.ndarray) -> np.ndarray:
@@ -163,28 +159,48 @@ def count_crossings(polygons: Sequence[np.ndarray], touching: bool = False) -> i
 def crossings(polygons: Sequence[np.ndarray], group: np.ndarray, touching: bool = False) -> np.ndarray:
     """The same for every group of polygons, (g,); `group` (k,) is the number of each polygon's group."""
     found = np.zeros(group.max() + 1, int)
-    for its in _meeting(polygons, group, touching):
-        found += np.bincount(its, minlength=len(found))
+    for sides in crossing_sides(polygons, group, touching):
+        found += np.bincount(_group_of(sides[0], polygons, group), minlength=len(found))
     return found
 
 
-def _meeting(polygons, group, touching):
-    """Yield the groups of pairs of sides that cross, or also touch, (k,), some at a time."""
+def are_crossed(polygons: Sequence[np.ndarray], group: np.ndarray, known: np.ndarray | None = None) -> np.ndarray:
+    """In which groups of polygons sides cross or touch, exactly, (g,) bool; `known` (g,) bool are some that count as
+    such anyway."""
+    found = np.zeros(group.max() + 1, bool) if known is None else known.copy()
+    for sides in crossing_sides(polygons, group, touching=True):
+        found[_group_of(sides[0], polygons, group)] = True
+        if found.all():  # thousands of sides may lie one over the other
+            break
+    return found
+
+
+def _group_of(sides, polygons, group):
+    return np.repeat(group, [len(points) for points in polygons])[sides]
+
+
+def crossing_sides(
+    polygons: Sequence[np.ndarray], group: np.ndarray, touching: bool = False
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the pairs of sides, of polygons of one group, that properly cross, or also touch, exactly, as two arrays of
+    numbers (k,), some at a time.  Sides are numbered polygon after polygon."""
     start, following, first = _sides(polygons)
     end = start[following]
     group = np.repeat(group, np.diff(first, append=len(start)))
     if touching:  # sides that run back over the one before
         back = end - start, end[following] - end
         on_a_line = turn(start, end, end[following]) == 0
-        yield group[on_a_line & ((back[0] * back[1]).sum(axis=1) <= 0)]
+        side = np.flatnonzero(on_a_line & ((back[0] * back[1]).sum(axis=1) <= 0))
+        yield side, following[side]
     for one, other in near_boxes(np.minimum(start, end), np.maximum(start, end), group):
         a, b, c, d = start[one], end[one], start[other], end[other]
         across, back = turn(a, b, c) * turn(a, b, d), turn(c, d, a) * turn(c, d, b)
         if touching:
             neighbours = (following[one] == other) | (following[other] == one)
-            yield group[one[(across <= 0) & (back <= 0) & ~neighbours]]
+            crossing = (across <= 0) & (back <= 0) & ~neighbours
         else:
-            yield group[one[(across < 0) & (back < 0)]]
+            crossing = (across < 0) & (back < 0)
+        yield one[crossing], other[crossing]
 
 
 def near_boxes(low: np.ndarray, high: np.ndarray, group: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -100,7 +100,7 @@ class Course(Improvement):
             live.uv, _ = live.domain.recalled(live.uv, self.best, np.ones(len(live.pieces), bool))
             yield from self.improve(live)
         else:
-            yield from self._freely(self.best.copy(), directly=True)
+            yield from self._freely(self.best.copy(), np.ones(self.batch.surface.piece_count, bool))
 
     # Starts
 
@@ -160,6 +160,7 @@ class Course(Improvement):
         batch, settings = self.batch, self.settings
         surface, p = batch.surface, batch.surface.piece_count
         start, certified, to_lead = batch.start, None, np.zeros(p, bool)
+        directly = np.full(p, settings.initial == "AUTO" or not settings.iterations)
         if settings.initial == "AUTO":
             good = batch.has_pins & ~wrong_pieces([surface], start)
             start, to_lead = self._before_pins(batch.has_pins & ~good)
@@ -168,9 +169,9 @@ class Course(Improvement):
             if new.any():
                 start = start.copy()
                 found = yield from best_start(surface if new.all() else surface.of(new), settings)
-                start[batch.rows(new)], known = found
+                start[batch.rows(new)], known, crossing = found
                 certified = np.zeros(p, bool)
-                certified[new] = known
+                certified[new], directly[new] = known, ~crossing
         elif settings.initial != "CURRENT":
             start = natural_start(surface, settings, settings.initial)
         if batch.has_pins.any():
@@ -178,10 +179,10 @@ class Course(Improvement):
             start, certified = np.where(batch.rows(to_lead)[:, None], start, placed), None
         yield PART
         self._begin(start)
-        yield from self._freely(start, settings.initial == "AUTO" or not settings.iterations, certified)
+        yield from self._freely(start, directly, certified)
 
-    def _freely(self, start: np.ndarray, directly: bool, certified: np.ndarray | None = None) -> Steps:
-        """Improve free maps; if `directly`, without iterations and air where the refinement soon arrives.
+    def _freely(self, start: np.ndarray, directly: np.ndarray, certified: np.ndarray | None = None) -> Steps:
+        """Improve free maps; `directly`, (p,) bool, without iterations and air where the refinement soon arrives.
 
         It may be known for which pieces (p,) the start is `certified`.
         """
@@ -341,7 +342,7 @@ class Course(Improvement):
         if late.any():
             start = self.best.copy()
             if self.settings.initial == "AUTO":
-                start[batch.rows(late)], _ = yield from best_start(batch.surface.of(late), self.settings)
+                start[batch.rows(late)], *_ = yield from best_start(batch.surface.of(late), self.settings)
             self._put_pins(start, late)
             yield from self._in_air(late, start)
         if not arrived.any():

@@ -51,7 +51,7 @@ _INITIAL = (
     Choice("HARMONIC", "Harmonic", "Angle preserving with the boundary held (cotangent weights)"),
     Choice("MEAN_VALUE", "Mean Value", "Free of flips on a convex boundary, whatever the mesh (Floater 2003)"),
     Choice("RINGS", "Rings", "In rings around the tips: tubes, horns and trees with one opening do not shrink away"),
-    Choice("CONFORMAL", "Conformal", "Angle preserving with a natural boundary (spectral conformal map)"),
+    Choice("CONFORMAL", "Conformal", "Angle preserving with a natural outline, opened where that would cross itself"),
     Choice("PROJECTION", "Projection", "Flat view on the plane of best fit; foldovers correct themselves"),
     Choice("CURRENT", "Current UVs", "Start from the UVs that the mesh has"),
 )

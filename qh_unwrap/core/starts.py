@@ -32,7 +32,7 @@ _TRACE = 1e-4  # of a surface's area, that flipped triangles may have for it to 
 def natural_start(surface: Surface, settings: Settings, initial: str) -> np.ndarray:
     """The map `initial` (n, 2) of every piece as it is, or within a circle where it needs a boundary."""
     if initial == "CONFORMAL":
-        return conformal(surface)
+        return conformal(surface)[0]
     if initial == "PROJECTION":
         return project(surface)
     n = len(surface.vertices)
@@ -56,15 +56,16 @@ def _weighted_or_ring_map(domain, initial):
     return ring_map(domain) if initial == "RINGS" else weighted_map(domain, initial)
 
 
-def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tuple[np.ndarray, np.ndarray]]:
+def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Of the certified natural maps of every piece a good one, or that of least energy; of all, if none is certified.
 
-    Returns the map (n, 2), and for which pieces (p,) it is certified; yields `PART` now and then.
+    Returns the map (n, 2), for which pieces (p,) it is certified, and which (p,) would cross themselves on the way if
+    nothing kept them from it; yields `PART` now and then.
     """
     start, least = np.zeros((len(surface.vertices), 2)), np.full(surface.piece_count, np.inf)
     certified, undecided = np.zeros(surface.piece_count, bool), np.ones(surface.piece_count, bool)
     bulging = surface.outline_lengths**2 < _BULGING * 4 * np.pi
-    untried = undecided.copy()
+    untried, crossing = undecided.copy(), ~undecided
     for initial, enough in _CANDIDATES.items():
         trying = undecided & ~bulging if initial in ("PROJECTION", "CONFORMAL") else undecided
         if initial == "STRIP":
@@ -80,6 +81,8 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
             yield PART
         if initial == "STRIP":
             uv = _within_outlines(part, straight[rows], "MEAN_VALUE")
+        elif initial == "CONFORMAL":
+            uv, crossing[pieces] = conformal(part)
         else:
             uv = natural_start(part, settings, initial)
         uv, _ = unfolded(part, uv, np.zeros((len(part.vertices), 2), bool), _TRACE)
@@ -98,7 +101,7 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
         undecided &= ~(certified & (least < enough))
         if not undecided.any():
             break
-    return start, certified
+    return start, certified, crossing
 
 
 def with_pins(surface: Surface, start: np.ndarray, uv: np.ndarray, pinned: np.ndarray) -> np.ndarray:

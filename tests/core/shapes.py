@@ -99,6 +99,18 @@ def strip(length, segments, bend=0.0):
     return vertices, triangles
 
 
+def stairs(count, across=1, rise=0.05):
+    """A strip of so many quads that winds up a helix, `across` side by side, each cut in two."""
+    step, side = np.meshgrid(np.arange(count + 1), np.arange(across + 1), indexing="ij")
+    angle, radius = 0.2 * step, 1 + 0.2 * side
+    vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), rise * angle], axis=-1).reshape(-1, 3)
+    corner = ((across + 1) * step + side)[:-1, :-1].ravel()
+    ahead = corner + across + 1
+    return vertices, np.vstack(
+        [np.column_stack([corner, ahead, ahead + 1]), np.column_stack([corner, ahead + 1, corner + 1])]
+    )
+
+
 def subdivided(vertices, triangles):
     """Every triangle cut in four at the middles of its edges, which are numbered after the vertices."""
     sides = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)

@@ -18,12 +18,13 @@ from .patches import Patches
 
 @pytest.fixture(scope="module")
 def meshes():
-    """Random disks of up to 150 triangles, and some with a hole."""
+    """Random disks of up to 150 triangles, some with a hole, and some that wind over themselves when laid flat."""
     patches = Patches()
-    return [patches(seed, largest=150)[1:] for seed in range(120)] + [shapes.ring(12, k) for k in (1, 2, 4)]
+    more = [shapes.ring(12, k) for k in (1, 2, 4)] + [shapes.stairs(*k) for k in ((35, 1), (60, 1), (40, 2))]
+    return [patches(seed, largest=150)[1:] for seed in range(120)] + more
 
 
-@pytest.mark.parametrize("make", [project, conformal])
+@pytest.mark.parametrize("make", [project, lambda surface: conformal(surface)[0]], ids=["projection", "conformal"])
 def test_maps_and_their_measures(meshes, make):
     surface = Surface(*joined(*zip(*meshes, strict=True)))
     uv = make(surface)

@@ -14,21 +14,9 @@ from . import shapes
 EVERYTHING = np.ones(1, bool)
 
 
-def stairs(count, across=1, rise=0.05):
-    """A strip of so many quads that winds up a helix, `across` side by side, each cut in two."""
-    step, side = np.meshgrid(np.arange(count + 1), np.arange(across + 1), indexing="ij")
-    angle, radius = 0.2 * step, 1 + 0.2 * side
-    vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), rise * angle], axis=-1).reshape(-1, 3)
-    corner = ((across + 1) * step + side)[:-1, :-1].ravel()
-    ahead = corner + across + 1
-    return vertices, np.vstack(
-        [np.column_stack([corner, ahead, ahead + 1]), np.column_stack([corner, ahead + 1, corner + 1])]
-    )
-
-
 def eared(count):
     """Stairs of so many quads with a triangle more at every third step, on the outer side."""
-    vertices, triangles = stairs(count)
+    vertices, triangles = shapes.stairs(count)
     one = 2 * np.arange(0, count, 3) + 1
     tips = (vertices[one] + vertices[one + 2]) / 2 * (1.1, 1.1, 1)
     more = np.column_stack([one, one + 2, len(vertices) + np.arange(len(one))])
@@ -37,7 +25,7 @@ def eared(count):
 
 @pytest.mark.parametrize("across", [1, 2])
 def test_a_strip_is_laid_straight_one_to_one(across):
-    vertices, triangles = stairs(1000, across)
+    vertices, triangles = shapes.stairs(1000, across)
     surface = Surface(vertices, triangles)
     found, places = strip_outlines(surface, EVERYTHING)
     assert found.all()
@@ -75,17 +63,17 @@ def legs(count):
 
 
 def test_what_is_short_or_branches_is_no_strip():
-    for mesh in (stairs(60), legs(500), shapes.grid(20, 20)):
+    for mesh in (shapes.stairs(60), legs(500), shapes.grid(20, 20)):
         assert not strip_outlines(Surface(*mesh), EVERYTHING)[0].any()
 
 
 def test_a_strip_that_was_not_asked_for_is_none():
-    assert not strip_outlines(Surface(*stairs(1000)), ~EVERYTHING)[0].any()
+    assert not strip_outlines(Surface(*shapes.stairs(1000)), ~EVERYTHING)[0].any()
 
 
 @pytest.mark.parametrize("across", [1, 2])
 def test_long_stairs_end_at_the_least_energy_in_a_few_steps(across):
-    result = unwrap(*stairs(1000, across))
+    result = unwrap(*shapes.stairs(1000, across))
     report = result.report
     assert report.injective and report.converged
     assert report.iterations <= 10
@@ -93,7 +81,7 @@ def test_long_stairs_end_at_the_least_energy_in_a_few_steps(across):
 
 
 def test_a_strip_with_a_hole():
-    vertices, triangles = stairs(1000, 3)
+    vertices, triangles = shapes.stairs(1000, 3)
     inner = 6 * 500 + 2 + np.array([0, 1])  # the two triangles of a quad in the middle of the strip
     kept = np.ones(len(triangles), bool)
     kept[[inner[0] // 2, len(triangles) // 2 + inner[0] // 2]] = False
