@@ -25,7 +25,9 @@ from .untangling import untangled
 
 PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
 PINS_FLIP = "no map without flips was found with these pins: unpin some, or move them"
-_NEAR = 1.2  # the energy of a start from which the refinement alone soon arrives
+_NEAR = 1.5  # the energy of a start from which the refinement alone soon arrives,
+_LARGE = 30_000  # vertices of a piece, from which on an iteration is so much cheaper than a step that this is
+_NEARER = 1.2  # instead
 _LONG = 1.5  # the squared outline from which on it may well cross itself, relative to that of a disk of the same area
 _IN_AIR = 5000  # vertices of the pieces that are improved together with air around them
 _LEADS = 12  # times that pins are moved on, before their island begins anew
@@ -194,10 +196,12 @@ class Course(Improvement):
         near = done = np.zeros(p, bool)
         if self.refining:
             value = energies(surface, start, settings.balance)
-            if (value < _NEAR).any():
+            size = np.diff(surface.vertex_starts, append=len(start))
+            soon = value < np.where(size < _LARGE, _NEAR, _NEARER)
+            if soon.any():
                 certified = certified_pieces(surface, start) if certified is None else certified
                 done = certified & (value <= ISOMETRIC) & ~batch.apart(start)
-                near = certified & (value < _NEAR) & ~done & ~batch.has_hold & directly
+                near = certified & soon & ~done & ~batch.has_hold & directly
         self.converged |= done
         if (done | near).any():
             yield STEP

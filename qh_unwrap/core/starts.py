@@ -14,7 +14,8 @@ from .certificate import certified_pieces, wrong_pieces
 from .chart import Surface
 from .domain import Fixed, Held
 from .energy import energies
-from .initial import conformal, fit, led, project, weighted_map
+from .flattening import Flattening, conformal
+from .initial import fit, led, project, weighted_map
 from .rings import ring_map
 from .settings import Settings
 from .stepping import PART
@@ -23,7 +24,7 @@ from .triangles import corners_of, signed_areas
 from .unfolding import unfolded
 
 # The starts to choose from, the cheapest first, and the energy that needs no further one
-_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "STRIP": 2, "MEAN_VALUE": 1e6, "RINGS": np.inf}
+_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "OPENED": 2, "STRIP": 2, "MEAN_VALUE": 1e6, "RINGS": np.inf}
 # A surface bulges if its outline is so short: then neither its projection nor its conformal map is any good.
 _BULGING = 0.45  # of the squared outline, relative to that of a disk of the surface's area
 _TRACE = 1e-4  # of a surface's area, that flipped triangles may have for it to be as good as valid
@@ -32,7 +33,7 @@ _TRACE = 1e-4  # of a surface's area, that flipped triangles may have for it to 
 def natural_start(surface: Surface, settings: Settings, initial: str) -> np.ndarray:
     """The map `initial` (n, 2) of every piece as it is, or within a circle where it needs a boundary."""
     if initial == "CONFORMAL":
-        return conformal(surface)[0]
+        return conformal(surface)
     if initial == "PROJECTION":
         return project(surface)
     n = len(surface.vertices)
@@ -68,7 +69,9 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
     untried, crossing = undecided.copy(), ~undecided
     for initial, enough in _CANDIDATES.items():
         trying = undecided & ~bulging if initial in ("PROJECTION", "CONFORMAL") else undecided
-        if initial == "STRIP":
+        if initial == "OPENED":
+            trying = undecided & crossing
+        elif initial == "STRIP":
             trying, straight = strip_outlines(surface, trying)
         if not trying.any():
             continue
@@ -82,7 +85,11 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
         if initial == "STRIP":
             uv = _within_outlines(part, straight[rows], "MEAN_VALUE")
         elif initial == "CONFORMAL":
-            uv, crossing[pieces] = conformal(part)
+            flattening, flattened = Flattening(part), trying
+            uv = flattening.map()
+        elif initial == "OPENED":
+            asked = trying[flattened]
+            uv = flattening.opened(asked)[trying[surface.vertex_piece[flattened[surface.vertex_piece]]]]
         else:
             uv = natural_start(part, settings, initial)
         uv, _ = unfolded(part, uv, np.zeros((len(part.vertices), 2), bool), _TRACE)
@@ -91,6 +98,8 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
         sure = (value < least[pieces]) | ~certified[pieces]
         if sure.any():
             sure &= certified_pieces(part, uv)
+        if initial == "CONFORMAL":
+            crossing[pieces] = ~sure & np.isfinite(value)
         better = np.where(sure == certified[pieces], value < least[pieces], sure)
         better |= untried[pieces]
         untried &= ~trying

@@ -4,7 +4,8 @@ import pytest
 
 from qh_unwrap.core import Surface, distortion
 from qh_unwrap.core.certificate import certified_pieces
-from qh_unwrap.core.initial import conformal, fit, project
+from qh_unwrap.core.flattening import Flattening, conformal
+from qh_unwrap.core.initial import fit, project
 from qh_unwrap.core.triangles import signed_areas
 
 from . import shapes
@@ -25,7 +26,7 @@ def cone(seed):
 
 def test_conformal_map_of_a_flat_patch_is_a_similarity():
     vertices, triangles = shapes.random_disk(1)
-    measured = distortion(vertices @ shapes.rotation(3).T, triangles, conformal(Surface(vertices, triangles))[0])
+    measured = distortion(vertices @ shapes.rotation(3).T, triangles, conformal(Surface(vertices, triangles)))
     assert measured.symmetric_dirichlet == pytest.approx(1, abs=1e-9)
     assert measured.flips == 0
 
@@ -33,40 +34,44 @@ def test_conformal_map_of_a_flat_patch_is_a_similarity():
 def test_conformal_map_keeps_angles_and_orientation_of_a_curved_patch():
     vertices, triangles = shapes.bump(2, inner=1500, outer=120)
     surface = Surface(vertices, triangles)
-    measured = distortion(vertices, triangles, conformal(surface)[0])
+    measured = distortion(vertices, triangles, conformal(surface))
     assert measured.angle < 1.05
     assert measured.flips == 0
 
 
 def test_conformal_map_of_nearly_developable_triangles():
     vertices, triangles, flat = cone(4)
-    measured = distortion(vertices, triangles, conformal(Surface(vertices, triangles))[0])
+    measured = distortion(vertices, triangles, conformal(Surface(vertices, triangles)))
     assert measured.angle < distortion(vertices, triangles, flat).angle + 1e-6
 
 
 def test_conformal_map_with_holes():
     vertices, triangles = shapes.ring()
-    uv = conformal(Surface(vertices, triangles))[0]
+    uv = conformal(Surface(vertices, triangles))
     assert distortion(vertices, triangles, uv).symmetric_dirichlet == pytest.approx(1, abs=1e-9)
 
 
 def test_an_outline_that_would_cross_itself_is_opened():
     vertices, triangles = shapes.stairs(35, 2)  # more than once around, and so they would lie in the plane
     surface = Surface(vertices, triangles)
-    uv, opened = conformal(surface)
-    assert opened.all() and certified_pieces(surface, uv).all()
+    flattening = Flattening(surface)
+    assert flattening.crossed().all() and not certified_pieces(surface, flattening.map()).any()
+    uv = conformal(surface)
+    assert certified_pieces(surface, uv).all()
     assert distortion(vertices, triangles, uv).symmetric_dirichlet < 1.6
 
 
 def test_what_does_not_cross_itself_is_not_opened():
     for mesh in (shapes.random_disk(1), shapes.grid(), shapes.stairs(20, 2)):
-        assert not conformal(Surface(*mesh))[1].any()
+        flattening = Flattening(Surface(*mesh))
+        assert not flattening.crossed().any()
+        np.testing.assert_array_equal(conformal(Surface(*mesh)), flattening.map())
 
 
 def test_what_half_a_circle_does_not_open_stays_as_it_is():
-    uv, opened = conformal(Surface(*shapes.stairs(400)))  # around twelve times
-    assert not opened.any()
-    assert distortion(*shapes.stairs(400), uv).symmetric_dirichlet < 1.01
+    flattening = Flattening(Surface(*shapes.stairs(400)))  # around twelve times
+    np.testing.assert_array_equal(flattening.opened(flattening.crossed()), flattening.map())
+    assert distortion(*shapes.stairs(400), flattening.map()).symmetric_dirichlet < 1.01
 
 
 def test_projection_sees_the_front_of_a_flat_patch():
