@@ -99,7 +99,7 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
         if sure.any():
             sure &= certified_pieces(part, uv)
         if initial == "CONFORMAL":
-            crossing[pieces] = ~sure & np.isfinite(value)
+            crossing[pieces] = ~sure & (value < enough)
         better = np.where(sure == certified[pieces], value < least[pieces], sure)
         better |= untried[pieces]
         untried &= ~trying
