@@ -15,7 +15,7 @@ from .chart import Surface
 from .loops import edge_lengths
 
 _NARROW = 200  # widths that a strip is long, at least: shorter ones end with less distortion from other starts
-_UNBRANCHED = 0.75  # of half its outline, that its ends are apart along edges, at least
+_ACROSS = 4  # widths that its sides are apart, at most: else it branches
 _BLUNT = 2  # power of the superellipse that ends the strip, relative to log2(length / width)
 
 
@@ -38,34 +38,41 @@ def _straight(surface):
     loop = surface.loops[0]
     sides = edge_lengths(surface.vertices[loop])
     length = sides.sum() / 2
-    first, last, apart = _ends(surface)
-    if apart < _UNBRANCHED * length:
+    width = 1 / length
+    distances = _Distances(surface)
+    first, last = distances.ends(loop)
+    ahead = (np.arange(len(loop)) - first) % len(loop) <= (last - first) % len(loop)
+    if distances.to(loop[ahead])[loop].max() > _ACROSS * width:
         return None
     at = np.roll(np.append(0.0, np.cumsum(np.roll(sides, -first))[:-1]), first)  # along the outline from the first end
     middle, whole = at[last], sides.sum()
-    ahead = at <= middle
     along = np.where(ahead, at / middle, (whole - at) / (whole - middle))
     # Where three vertices in a row lie on a straight line, the triangle between them would be flat: convex everywhere
     # are the sides of a superellipse, if hardly.
-    width = 1 / length
     power = _BLUNT * np.log2(length / width)
     half = width / 2 * np.maximum(1 - np.abs(2 * along - 1) ** power, 0) ** (1 / power)
     half += _ears(surface)[loop]
     return np.column_stack([length * along, np.where(ahead, -half, half)])
 
 
-def _ends(surface):
-    """The two places in the outline that are farthest apart along edges, nearly, and their distance."""
-    points, loop = surface.vertices, surface.loops[0]
-    i, j = surface.edges.T
-    length = np.linalg.norm(points[i] - points[j], axis=1)
-    graph = coo_array((np.maximum(length, 1e-9 * length.max()), (i, j)), shape=(len(points),) * 2).tocsr()
-    farthest = 0
-    for _ in range(2):
-        first = farthest
-        distance = dijkstra(graph, directed=False, indices=loop[first])[loop]
-        farthest = int(np.argmax(distance))
-    return first, farthest, distance[farthest]
+class _Distances:
+    """Distances along the edges of a surface."""
+
+    def __init__(self, surface: Surface):
+        points, (i, j) = surface.vertices, surface.edges.T
+        length = np.linalg.norm(points[i] - points[j], axis=1)
+        # Of coincident vertices no distance is stored by SciPy: make it a short one.
+        length = np.maximum(length, 1e-9 * length.max())
+        self._graph = coo_array((length, (i, j)), shape=(len(points),) * 2).tocsr()
+
+    def to(self, vertices: np.ndarray) -> np.ndarray:
+        """From every vertex to the next one of these, (n,)."""
+        return dijkstra(self._graph, directed=False, indices=vertices, min_only=True)
+
+    def ends(self, loop: np.ndarray) -> tuple[int, int]:
+        """The two places in a loop that are farthest apart, nearly."""
+        first = int(np.argmax(self.to(loop[:1])[loop]))
+        return first, int(np.argmax(self.to(loop[first : first + 1])[loop]))
 
 
 def _ears(surface):

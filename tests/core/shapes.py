@@ -99,10 +99,10 @@ def strip(length, segments, bend=0.0):
     return vertices, triangles
 
 
-def stairs(count, across=1, rise=0.05):
-    """A strip of so many quads that winds up a helix, `across` side by side, each cut in two."""
+def stairs(count, across=1, rise=0.05, width=0.2):
+    """A strip of so many quads that winds up a helix, `across` side by side, each cut in two and so wide."""
     step, side = np.meshgrid(np.arange(count + 1), np.arange(across + 1), indexing="ij")
-    angle, radius = 0.2 * step, 1 + 0.2 * side
+    angle, radius = 0.2 * step, 1 + width * side
     vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), rise * angle], axis=-1).reshape(-1, 3)
     corner = ((across + 1) * step + side)[:-1, :-1].ravel()
     ahead = corner + across + 1

@@ -67,6 +67,13 @@ def test_what_is_short_or_branches_is_no_strip():
         assert not strip_outlines(Surface(*mesh), EVERYTHING)[0].any()
 
 
+def test_sides_of_a_strip_may_have_different_lengths():
+    vertices, triangles = shapes.stairs(2000, width=1)  # one is twice as long as the other
+    assert strip_outlines(Surface(vertices, triangles), EVERYTHING)[0].all()
+    report = unwrap(vertices, triangles).report
+    assert report.injective and report.converged and report.iterations <= 10
+
+
 def test_a_strip_that_was_not_asked_for_is_none():
     assert not strip_outlines(Surface(*shapes.stairs(1000)), ~EVERYTHING)[0].any()
 
