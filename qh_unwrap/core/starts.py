@@ -23,7 +23,7 @@ from .strips import strip_outlines
 from .triangles import corners_of, signed_areas
 from .unfolding import unfolded
 
-# The starts to choose from, the cheapest first, and the energy that needs no further one
+# The starts to choose from, the cheapest or best first, and the energy that needs no further one
 _CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "OPENED": 2, "STRIP": 2, "MEAN_VALUE": 1e6, "RINGS": np.inf}
 # A surface bulges if its outline is so short: then neither its projection nor its conformal map is any good.
 _BULGING = 0.45  # of the squared outline, relative to that of a disk of the surface's area
@@ -57,6 +57,39 @@ def _weighted_or_ring_map(domain, initial):
     return ring_map(domain) if initial == "RINGS" else weighted_map(domain, initial)
 
 
+class _Candidates:
+    """The natural maps of a surface's pieces, of which some suit only some of them."""
+
+    def __init__(self, surface: Surface, settings: Settings):
+        self._surface, self._settings = surface, settings
+        self._bulging = surface.outline_lengths**2 < _BULGING * 4 * np.pi
+        self.crossing = np.zeros(surface.piece_count, bool)
+        """(p,), the pieces whose conformal maps would be good if they did not cross themselves"""
+
+    def suited(self, initial: str, pieces: np.ndarray) -> np.ndarray:
+        """For which of the chosen `pieces` (p,) bool a map of that kind is worth trying, (p,) bool."""
+        if initial in ("PROJECTION", "CONFORMAL"):
+            return pieces & ~self._bulging
+        if initial == "OPENED":
+            return pieces & self.crossing
+        if initial == "STRIP":
+            found, self._straight = strip_outlines(self._surface, pieces)
+            return found
+        return pieces
+
+    def map(self, initial: str, pieces: np.ndarray, part: Surface) -> np.ndarray:
+        """The map (n', 2) of the `part` of the surface that consists of the chosen `pieces` (p,) bool."""
+        rows = pieces[self._surface.vertex_piece]
+        if initial == "CONFORMAL":
+            self._flattening, self._flat_pieces, self._flat_rows = Flattening(part), pieces, rows
+            return self._flattening.map()
+        if initial == "OPENED":
+            return self._flattening.opened(pieces[self._flat_pieces])[rows[self._flat_rows]]
+        if initial == "STRIP":
+            return _within_outlines(part, self._straight[rows], "MEAN_VALUE")
+        return natural_start(part, self._settings, initial)
+
+
 def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Of the certified natural maps of every piece a good one, or that of least energy; of all, if none is certified.
 
@@ -65,33 +98,18 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
     """
     start, least = np.zeros((len(surface.vertices), 2)), np.full(surface.piece_count, np.inf)
     certified, undecided = np.zeros(surface.piece_count, bool), np.ones(surface.piece_count, bool)
-    bulging = surface.outline_lengths**2 < _BULGING * 4 * np.pi
-    untried, crossing = undecided.copy(), ~undecided
+    untried, candidates = undecided.copy(), _Candidates(surface, settings)
     for initial, enough in _CANDIDATES.items():
-        trying = undecided & ~bulging if initial in ("PROJECTION", "CONFORMAL") else undecided
-        if initial == "OPENED":
-            trying = undecided & crossing
-        elif initial == "STRIP":
-            trying, straight = strip_outlines(surface, trying)
+        trying = candidates.suited(initial, undecided)
         if not trying.any():
             continue
         pieces = np.flatnonzero(trying)
-        rows = np.flatnonzero(trying[surface.vertex_piece])
         part = surface if trying.all() else surface.of(trying)
         if initial == "CONFORMAL":
             yield PART
             part.order  # noqa: B018 (it is kept)
             yield PART
-        if initial == "STRIP":
-            uv = _within_outlines(part, straight[rows], "MEAN_VALUE")
-        elif initial == "CONFORMAL":
-            flattening, flattened = Flattening(part), trying
-            uv = flattening.map()
-        elif initial == "OPENED":
-            asked = trying[flattened]
-            uv = flattening.opened(asked)[trying[surface.vertex_piece[flattened[surface.vertex_piece]]]]
-        else:
-            uv = natural_start(part, settings, initial)
+        uv = candidates.map(initial, trying, part)
         uv, _ = unfolded(part, uv, np.zeros((len(part.vertices), 2), bool), _TRACE)
         value = energies(part, uv, settings.balance)
         # What could be better is worth the certificate.
@@ -99,18 +117,18 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
         if sure.any():
             sure &= certified_pieces(part, uv)
         if initial == "CONFORMAL":
-            crossing[pieces] = ~sure & (value < enough)
+            candidates.crossing[pieces] = ~sure & (value < enough)
         better = np.where(sure == certified[pieces], value < least[pieces], sure)
         better |= untried[pieces]
         untried &= ~trying
         taken = pieces[better]
         least[taken], certified[taken] = value[better], sure[better]
         its = better[part.vertex_piece]
-        start[rows[its]] = uv[its]
+        start[np.flatnonzero(trying[surface.vertex_piece])[its]] = uv[its]
         undecided &= ~(certified & (least < enough))
         if not undecided.any():
             break
-    return start, certified, crossing
+    return start, certified, candidates.crossing
 
 
 def with_pins(surface: Surface, start: np.ndarray, uv: np.ndarray, pinned: np.ndarray) -> np.ndarray:
