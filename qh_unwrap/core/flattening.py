@@ -138,6 +138,7 @@ class _Outlines:
         """How much every vertex belongs to what lies between sides that cross with such shares, from 0 to 1, (k,)."""
         weight = np.zeros(len(share))
         at = np.cumsum(self._length) - self._length
+        middle = at + self._length / 2  # of the side that follows each vertex
         found = 0
         for sides in crossing_sides(self._polygons(share), np.arange(len(self._starts))):
             for one, other in np.sort(np.column_stack(sides), axis=1)[: _SEVERAL - found].tolist():
@@ -145,9 +146,9 @@ class _Outlines:
                 first, whole = self._starts[piece], self._whole[piece]
                 its = slice(first, first + np.searchsorted(self._piece[first:], piece, "right"))
                 # The shorter of both parts of the outline
-                begin, length = at[one], at[other] - at[one]
+                begin, length = middle[one], middle[other] - middle[one]
                 if length > whole / 2:
-                    begin, length = at[other], whole - length
+                    begin, length = middle[other], whole - length
                 away = np.abs((at[its] - begin - length / 2 + whole / 2) % whole - whole / 2) - length / 2
                 weight[its] = np.maximum(weight[its], np.clip(1 - away / (_REACH * length), 0, 1))
             found += len(sides[0])

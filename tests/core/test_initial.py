@@ -61,6 +61,17 @@ def test_an_outline_that_would_cross_itself_is_opened():
     assert distortion(vertices, triangles, uv).symmetric_dirichlet < 1.6
 
 
+@pytest.mark.parametrize("mesh", [(33, 1), (35, 2), (40, 1)])
+def test_what_is_opened_is_mirrored_with_its_surface(mesh):
+    vertices, triangles = shapes.stairs(*mesh)
+    vertices *= 1 + 0.1 * np.random.default_rng(0).random((len(vertices), 1))  # not symmetric by itself
+    order = np.random.default_rng(1).permutation(len(vertices))
+    here = conformal(Surface(vertices, triangles))
+    there = conformal(Surface(vertices[order] * [-1, 1, 1], np.argsort(order)[triangles[:, ::-1]]))
+    apart = np.linalg.norm(here[order][:, None] - here[order], axis=2) - np.linalg.norm(there[:, None] - there, axis=2)
+    assert np.abs(apart).max() < 1e-9 * np.ptp(here)
+
+
 def test_what_does_not_cross_itself_is_not_opened():
     for mesh in (shapes.random_disk(1), shapes.grid(), shapes.stairs(20, 2)):
         flattening = Flattening(Surface(*mesh))
