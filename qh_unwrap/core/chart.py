@@ -260,6 +260,15 @@ class Surface(Chart):
         )
         return low, high - low
 
+    def in_unit_square(self, uv: np.ndarray) -> np.ndarray:
+        """Every piece's map `uv` (n, 2) moved and scaled, so that the longer side of the box around it is 0 to 1."""
+        low, size = self.boxes(uv)
+        size = size.max(axis=1, keepdims=True)
+        size[size == 0] = 1
+        if self.piece_count == 1:
+            return (uv - low[0]) / size[0]
+        return (uv - low[self.vertex_piece]) / size[self.vertex_piece]
+
     def numbering(self, pieces: np.ndarray) -> np.ndarray:
         """The number that every vertex has in the surface of the chosen `pieces` (p,) bool, (n,)."""
         return np.cumsum(pieces[self.vertex_piece]) - 1

@@ -15,7 +15,7 @@ from .weights import cotangent
 _ROUNDEST = 0.5  # share of a circle's bends that outlines take on at most not to cross themselves,
 _HALVINGS = 3  # of the range in which the least such share is looked for
 _REACH = 4  # lengths of what lies between two crossing sides, to which it bends around them
-_SEVERAL = 500  # pairs of crossing sides that are looked at
+_SEVERAL = 500  # pairs of crossing sides of an outline that are looked at
 
 
 class Flattening:
@@ -104,8 +104,8 @@ class _Outlines:
         """The share, (k,), by which those that are `crossed`, (p,) bool, are to bend like circles, as little as they
         must not to cross themselves, if that helps: around where they do, else everywhere."""
         share = np.zeros(len(self._bend))
-        for where in (self._around, np.ones_like):
-            weight = where(share)
+        for where in (self._around, self._everywhere):
+            weight = where(crossed)
             least, most = np.zeros(len(crossed)), np.where(crossed, _ROUNDEST, 0)
             most[self._crossed(most[self._piece] * weight, crossed)] = 0
             for _ in range(_HALVINGS if most.any() else 0):
@@ -134,26 +134,31 @@ class _Outlines:
             result[which] = are_crossed([polygons[k] for k in which], np.arange(len(which)))
         return result
 
-    def _around(self, share):
-        """How much every vertex belongs to what lies between sides that cross with such shares, from 0 to 1, (k,)."""
-        weight = np.zeros(len(share))
-        at = np.cumsum(self._length) - self._length
-        middle = at + self._length / 2  # of the side that follows each vertex
-        found = 0
-        for sides in crossing_sides(self._polygons(share), np.arange(len(self._starts))):
-            for one, other in np.sort(np.column_stack(sides), axis=1)[: _SEVERAL - found].tolist():
-                piece = self._piece[one]
-                first, whole = self._starts[piece], self._whole[piece]
-                its = slice(first, first + np.searchsorted(self._piece[first:], piece, "right"))
-                # The shorter of both parts of the outline
-                begin, length = middle[one], middle[other] - middle[one]
-                if length > whole / 2:
-                    begin, length = middle[other], whole - length
-                away = np.abs((at[its] - begin - length / 2 + whole / 2) % whole - whole / 2) - length / 2
-                weight[its] = np.maximum(weight[its], np.clip(1 - away / (_REACH * length), 0, 1))
-            found += len(sides[0])
-            if found >= _SEVERAL:
-                break
+    def _everywhere(self, _crossed):
+        return np.ones(len(self._bend))
+
+    def _around(self, crossed):
+        """How much every vertex belongs to what lies between sides that cross, of the pieces that are `crossed`, (p,)
+        bool, from 0 to 1, (k,)."""
+        weight = np.zeros(len(self._bend))
+        polygons = self._polygons(weight)
+        ends = np.append(self._starts, len(weight))
+        for k in np.flatnonzero(crossed).tolist():
+            its = slice(ends[k], ends[k + 1])
+            whole, at = self._whole[k], np.cumsum(self._length[its]) - self._length[its]
+            middle = at + self._length[its] / 2  # of the side that follows each vertex
+            found = 0
+            for sides in crossing_sides(polygons[k : k + 1], np.zeros(1, int)):
+                for one, other in np.sort(np.column_stack(sides), axis=1)[: _SEVERAL - found].tolist():
+                    # The shorter of both parts of the outline
+                    begin, length = middle[one], middle[other] - middle[one]
+                    if length > whole / 2:
+                        begin, length = middle[other], whole - length
+                    away = np.abs((at - begin - length / 2 + whole / 2) % whole - whole / 2) - length / 2
+                    weight[its] = np.maximum(weight[its], np.clip(1 - away / (_REACH * length), 0, 1))
+                found += len(sides[0])
+                if found >= _SEVERAL:
+                    break
         return weight
 
 

@@ -107,15 +107,12 @@ class Improvement:
         surface = surface or self.batch.surface
         if self.settings.boundary != "FREE":
             return uv
-        low, size = surface.boxes(uv)
-        size = size.max(axis=1, keepdims=True)
-        size[size == 0] = 1
         in_frame = self.batch.in_frame(self.settings)
         in_frame = in_frame if pieces is None else in_frame[pieces]
-        low[in_frame], size[in_frame] = 0, 1
-        if surface.piece_count == 1:
-            return uv if in_frame[0] else (uv - low[0]) / size[0]
-        return (uv - low[surface.vertex_piece]) / size[surface.vertex_piece]
+        if in_frame.all():
+            return uv
+        moved = surface.in_unit_square(uv)
+        return np.where(in_frame[surface.vertex_piece, None], uv, moved) if in_frame.any() else moved
 
     def improve(self, group: Group) -> Steps:
         """Iterate, and refine what has done with that."""

@@ -111,13 +111,15 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
             yield PART
         uv = candidates.map(initial, trying, part)
         uv, _ = unfolded(part, uv, np.zeros((len(part.vertices), 2), bool), _TRACE)
+        uv = part.in_unit_square(uv)  # where it must be certified in the end: elsewhere rounding is another
         value = energies(part, uv, settings.balance)
         # What could be better is worth the certificate.
-        sure = (value < least[pieces]) | ~certified[pieces]
-        if sure.any():
-            sure &= certified_pieces(part, uv)
+        promising = (value < least[pieces]) | ~certified[pieces]
+        if initial == "OPENED":  # else it leads nowhere good
+            promising &= value < enough
+        sure = promising & certified_pieces(part, uv) if promising.any() else promising
         if initial == "CONFORMAL":
-            candidates.crossing[pieces] = ~sure & (value < enough)
+            candidates.crossing[pieces] = promising & ~sure & (value < enough)
         better = np.where(sure == certified[pieces], value < least[pieces], sure)
         better |= untried[pieces]
         untried &= ~trying

@@ -2,10 +2,11 @@
 import numpy as np
 import pytest
 
-from qh_unwrap.core import Surface, distortion
+from qh_unwrap.core import Surface, distortion, unwrap
 from qh_unwrap.core.certificate import certified_pieces
 from qh_unwrap.core.flattening import Flattening, conformal
 from qh_unwrap.core.initial import fit, project
+from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.triangles import signed_areas
 
 from . import shapes
@@ -101,3 +102,44 @@ def test_fit_undoes_similarities_and_mirrors():
         targets = 3 * (points * [mirror, 1]) @ [[0.8, 0.6], [-0.6, 0.8]] + 2
         np.testing.assert_allclose(fit(points, chosen, targets, mirror=True), targets, atol=1e-12)
     np.testing.assert_allclose(fit(np.zeros((20, 2)), chosen, targets)[0], targets[chosen].mean(axis=0))
+
+
+def test_what_is_opened_is_so_in_any_company():
+    meshes = shapes.stairs(2000), cut_ruffle(3, 41, 8), shapes.stairs(1500)  # the others cross themselves everywhere
+    together = Surface(*joined(*zip(*meshes, strict=True)))
+    its = conformal(together)[together.vertex_piece == 1]
+    here = conformal(Surface(*meshes[1]))
+    apart = np.linalg.norm(here[:, None] - here, axis=2) - np.linalg.norm(its[:, None] - its, axis=2)
+    assert np.abs(apart).max() < 1e-9 * np.ptp(here)
+
+
+def cut_ruffle(waves=9, around=161, across=25):
+    """A disk with waves, cut open from its small hole to its rim by a cut whose sides are 1e-17 apart."""
+    angle, radius = np.meshgrid(np.linspace(0, 2 * np.pi, around), np.linspace(0.02, 1, across), indexing="ij")
+    height = 0.6 * radius * np.sin(waves * angle)
+    vertices = np.column_stack([each.ravel() for each in (radius * np.cos(angle), radius * np.sin(angle), height)])
+    corner = np.add.outer(across * np.arange(around - 1), np.arange(across - 1)).ravel()
+    up = corner + across
+    return vertices, np.vstack([np.column_stack([corner, up, up + 1]), np.column_stack([corner, up + 1, corner + 1])])
+
+
+def test_a_start_is_certified_where_it_is_in_the_end():
+    # Around zero 32-bit floats tell the sides of the cut apart, in the unit square they do not.
+    report = unwrap(*cut_ruffle()).report
+    assert report.injective and report.converged
+
+
+def comb(size=60, every=4):
+    """A flat plate of so many quads a side, with cuts of no width that reach from one side nearly to the other."""
+    vertices, triangles = shapes.grid(size, size)
+    row, column = np.divmod(np.arange(len(vertices)), size + 1)
+    cut = (column % every == 0) & (column > 0) & (column < size) & (row < size - 3)
+    right = column[triangles] < column[triangles].max(axis=1, keepdims=True)
+    triangles = triangles + len(vertices) * (cut[triangles] & right)
+    used, triangles = np.unique(triangles, return_inverse=True)
+    return vertices[used % len(vertices)], triangles.reshape(-1, 3)
+
+
+def test_what_must_be_opened_far_does_not_begin_with_that():
+    report = unwrap(*comb()).report
+    assert report.injective and report.after.symmetric_dirichlet < 1.005
