@@ -13,8 +13,8 @@ from .pieces import starts_of
 from .weights import cotangent
 
 _ROUNDEST = 0.5  # share of a circle's bends that outlines take on at most not to cross themselves,
-_HALVINGS = 3  # of the range in which the least such share is looked for
-_REACH = 4  # lengths of what lies between two crossing sides, to which it bends around them
+_HALVINGS = 2  # of the range in which the least such share is looked for
+_REACH = 16  # lengths of what lies between two crossing sides, to which it bends around them
 _SEVERAL = 500  # pairs of crossing sides of an outline that are looked at
 
 
