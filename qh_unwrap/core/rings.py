@@ -11,9 +11,8 @@ surface branches.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
+from .distances import EdgeDistances
 from .domain import Held
 from .pieces import components
 from .weights import cotangent, mean_value
@@ -25,7 +24,8 @@ _DEEPEST = 1e4  # of a place, by its radius, that the layout still makes up for
 
 def ring_map(domain: Held) -> np.ndarray:
     """The map (n, 2) of a domain whose outlines are held on convex polygons, in rings around its tips."""
-    length, distance = _distances(domain)
+    distances = EdgeDistances(domain.points, domain.triangles.edges)
+    length, distance = distances.length, distances.to(np.concatenate(domain.island.outlines))
     depth = _depths(domain, length, distance)
     weights = []
     for chart in domain.charts:
@@ -45,20 +45,6 @@ def _gradients(chart, values):
     a, b, c = values[chart.triangles.T]
     (h1, h2), (k1, k2) = chart.hats
     return np.array([(b - a) * h1 + (c - a) * k1, (b - a) * h2 + (c - a) * k2])
-
-
-def _distances(domain):
-    """The length of every edge (k,), and the distance of every vertex (n,) from its piece's outline along edges."""
-    island = domain.island
-    points = domain.points
-    edges = domain.triangles.edges
-    i, j = edges.T
-    length = np.linalg.norm(points[i] - points[j], axis=1)
-    # Of coincident vertices no distance is stored by SciPy: make it a short one.
-    length = np.maximum(length, 1e-9 * length.max())
-    graph = coo_array((length, (i, j)), shape=(len(points), len(points))).tocsr()
-    distance = dijkstra(graph, directed=False, indices=np.concatenate(island.outlines), min_only=True)
-    return length, distance
 
 
 def _depths(domain, length, distance):

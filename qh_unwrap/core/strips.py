@@ -8,10 +8,9 @@ the strip bends sideways over its own width.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
 from .chart import Surface
+from .distances import EdgeDistances
 from .loops import edge_lengths
 
 _NARROW = 200  # widths that a strip is long, at least: shorter ones end with less distortion from other starts
@@ -39,8 +38,8 @@ def _straight(surface):
     sides = edge_lengths(surface.vertices[loop])
     length = sides.sum() / 2
     width = 1 / length
-    distances = _Distances(surface)
-    first, last = distances.ends(loop)
+    distances = EdgeDistances(surface.vertices, surface.edges)
+    first, last = _ends(distances, loop)
     ahead = (np.arange(len(loop)) - first) % len(loop) <= (last - first) % len(loop)
     if distances.to(loop[ahead])[loop].max() > _ACROSS * width:
         return None
@@ -55,24 +54,10 @@ def _straight(surface):
     return np.column_stack([length * along, np.where(ahead, -half, half)])
 
 
-class _Distances:
-    """Distances along the edges of a surface."""
-
-    def __init__(self, surface: Surface):
-        points, (i, j) = surface.vertices, surface.edges.T
-        length = np.linalg.norm(points[i] - points[j], axis=1)
-        # Of coincident vertices no distance is stored by SciPy: make it a short one.
-        length = np.maximum(length, 1e-9 * length.max())
-        self._graph = coo_array((length, (i, j)), shape=(len(points),) * 2).tocsr()
-
-    def to(self, vertices: np.ndarray) -> np.ndarray:
-        """From every vertex to the next one of these, (n,)."""
-        return dijkstra(self._graph, directed=False, indices=vertices, min_only=True)
-
-    def ends(self, loop: np.ndarray) -> tuple[int, int]:
-        """The two places in a loop that are farthest apart, nearly."""
-        first = int(np.argmax(self.to(loop[:1])[loop]))
-        return first, int(np.argmax(self.to(loop[first : first + 1])[loop]))
+def _ends(distances, loop):
+    """The two places in a loop that are farthest apart, nearly."""
+    first = int(np.argmax(distances.to(loop[:1])[loop]))
+    return first, int(np.argmax(distances.to(loop[first : first + 1])[loop]))
 
 
 def _ears(surface):
