@@ -14,9 +14,9 @@ from .boundary import held_outlines
 from .certificate import certified_pieces, wrong_pieces
 from .chart import Surface
 from .domain import Fixed, Plane, airs_around, loose, outlined, rigid
-from .energy import energies
+from .energy import ISOMETRIC, energies
 from .errors import SingularError
-from .improvement import ISOMETRIC, D, Group, Improvement, Steps
+from .improvement import D, Group, Improvement, Steps
 from .pins import lead, way_of
 from .settings import Settings
 from .starts import before_pins, best_start, natural_start, start_within, with_pins

@@ -18,7 +18,7 @@ from .certificate import certified_pieces, orientation, wrong_pieces
 from .chart import Surface
 from .descent import Descent
 from .domain import Domain
-from .energy import energies, map_scale
+from .energy import ISOMETRIC, energies, map_scale
 from .errors import UnwrapError
 from .quasi_harmonic import Iteration
 from .settings import Settings
@@ -26,7 +26,6 @@ from .stepping import PART, STEP
 from .unfolding import unfolded
 
 _HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement
-ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
 _FOLDED = 0.2  # of a surface's area, that flipped triangles may have for it to be worth unfolding
 _FEW = 0.75  # once only this part of the vertices still moves, the others take part no longer
 

@@ -13,7 +13,7 @@ from .boundary import held_outlines
 from .certificate import certified_pieces, wrong_pieces
 from .chart import Surface
 from .domain import Fixed, Held
-from .energy import energies
+from .energy import ISOMETRIC, energies
 from .flattening import Flattening, conformal
 from .initial import fit, led, project, weighted_map
 from .rings import ring_map
@@ -111,8 +111,11 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
             yield PART
         uv = candidates.map(initial, trying, part)
         uv, _ = unfolded(part, uv, np.zeros((len(part.vertices), 2), bool), _TRACE)
-        uv = part.in_unit_square(uv)  # where it must be certified in the end: elsewhere rounding is another
         value = energies(part, uv, settings.balance)
+        # In the unit square it must be certified in the end, and elsewhere rounding is another.  But in maps that are
+        # to stay cuts are closed, and their sides may well lie on each other there.
+        staying = (value <= ISOMETRIC)[part.vertex_piece, None]
+        uv = np.where(staying, uv, part.in_unit_square(uv))
         # What could be better is worth the certificate.
         promising = (value < least[pieces]) | ~certified[pieces]
         if initial == "OPENED":  # else it leads nowhere good
