@@ -112,15 +112,16 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
         uv = candidates.map(initial, trying, part)
         uv, _ = unfolded(part, uv, np.zeros((len(part.vertices), 2), bool), _TRACE)
         value = energies(part, uv, settings.balance)
-        # In the unit square it must be certified in the end, and elsewhere rounding is another.  But in maps that are
-        # to stay cuts are closed, and their sides may well lie on each other there.
-        staying = (value <= ISOMETRIC)[part.vertex_piece, None]
-        uv = np.where(staying, uv, part.in_unit_square(uv))
         # What could be better is worth the certificate.
         promising = (value < least[pieces]) | ~certified[pieces]
         if initial == "OPENED":  # else it leads nowhere good
             promising &= value < enough
-        sure = promising & certified_pieces(part, uv) if promising.any() else promising
+        sure = promising
+        if promising.any():
+            # In the unit square it must be certified in the end, and elsewhere rounding is another.  But in maps that
+            # are to stay cuts are closed, and their sides may well lie on each other there.
+            staying = (value <= ISOMETRIC)[part.vertex_piece, None]
+            sure = promising & certified_pieces(part, np.where(staying, uv, part.in_unit_square(uv)))
         if initial == "CONFORMAL":
             candidates.crossing[pieces] = promising & ~sure & (value < enough)
         better = np.where(sure == certified[pieces], value < least[pieces], sure)
