@@ -41,7 +41,7 @@ def _straight(surface):
     distances = EdgeDistances(surface.vertices, surface.edges)
     first, last = _ends(distances, loop)
     ahead = (np.arange(len(loop)) - first) % len(loop) <= (last - first) % len(loop)
-    if distances.to(loop[ahead])[loop].max() > _ACROSS * width:
+    if any(distances.to(loop[side])[loop].max() > _ACROSS * width for side in (ahead, ~ahead)):
         return None
     at = np.roll(np.append(0.0, np.cumsum(np.roll(sides, -first))[:-1]), first)  # along the outline from the first end
     middle, whole = at[last], sides.sum()
