@@ -72,6 +72,16 @@ def test_what_is_short_or_branches_is_no_strip():
         assert not strip_outlines(branching, EVERYTHING)[0].any()
 
 
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_a_single_edge_is_no_side_of_a_strip(mirror):
+    count = 40
+    along = np.linspace(0, 1, count)
+    vertices = np.column_stack([along, mirror * 1e-3 * along * (1 - along), 0 * along])
+    k = np.arange(1, count - 1)
+    triangles = np.column_stack([0 * k, k + 1, k])[:, ::mirror]
+    assert not strip_outlines(Surface(vertices, triangles), EVERYTHING)[0].any()
+
+
 def test_sides_of_a_strip_may_have_different_lengths():
     vertices, triangles = shapes.stairs(2000, width=1)  # one is twice as long as the other
     assert strip_outlines(Surface(vertices, triangles), EVERYTHING)[0].all()
