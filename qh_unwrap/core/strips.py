@@ -23,7 +23,7 @@ def strip_outlines(surface: Surface, asked: np.ndarray) -> tuple[np.ndarray, np.
     straight, (n, 2)."""
     places = np.zeros((len(surface.vertices), 2))
     found = asked & (surface.outline_lengths**2 / 4 > _NARROW)  # of area 1
-    for k in np.flatnonzero(found):
+    for k in np.flatnonzero(found).tolist():
         one = surface.one(k)
         straight = _straight(one)
         found[k] = straight is not None
