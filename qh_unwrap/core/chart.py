@@ -295,9 +295,12 @@ class Surface(Chart):
         made.on_boundary = self.on_boundary.reshape(3, -1)[:, chosen].ravel()
         made.loops = [vertex_number[loop] for loop, its in zip(self.loops, self.loop_piece, strict=True) if pieces[its]]
         made.loop_piece = new_piece[self.loop_piece[pieces[self.loop_piece]]]
-        dissection = self.__dict__.get("dissection")  # if there is one already
+        # If they are there already
+        dissection, order = self.__dict__.get("dissection"), self.__dict__.get("order")
         if dissection is not None:
             made.dissection = Dissection(dissection.key[chosen_vertices], dissection.levels)
+        elif order is not None:
+            made.order = vertex_number[order[chosen_vertices[order]]]
         return made
 
     def one(self, k: int) -> Surface:

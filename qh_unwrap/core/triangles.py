@@ -50,12 +50,13 @@ def sums_by_parts(function: Callable[..., np.ndarray], starts: np.ndarray, *fiel
     Like `by_parts`, but the field itself is never as long as the others.  A piece may begin in one part and end in
     another: each part adds what it has of every piece that it meets.
     """
-    sums = np.zeros(())
+    sums = np.zeros((0, len(starts)))
     for part in parts(fields[0].shape[-1]):
         found = function(*(field[..., part] for field in fields))
+        if not len(sums):
+            sums = np.zeros((len(found), len(starts)))
         pieces = slice(np.searchsorted(starts, part.start, side="right") - 1, np.searchsorted(starts, part.stop))
-        in_part = np.add.reduceat(found, np.maximum(starts[pieces] - part.start, 0), axis=1)
-        sums = sums + np.pad(in_part, ((0, 0), (pieces.start, len(starts) - pieces.stop)))
+        sums[:, pieces] += np.add.reduceat(found, np.maximum(starts[pieces] - part.start, 0), axis=1)
     return sums
 
 

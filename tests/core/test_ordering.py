@@ -62,6 +62,17 @@ def test_pieces_are_eliminated_with_as_little_fill_as_alone(inner):
     assert fill(batch, order) < 1.1 * alone
 
 
+def test_some_pieces_are_eliminated_as_all_are():
+    meshes = [shapes.bump(k, inner=count, outer=20) for k, count in enumerate((300, 200, 400))]
+    batch = Surface(*joined(*zip(*meshes, strict=True)))
+    anew = batch.of(np.array([True, False, True])).order
+    order = batch.order
+    some = batch.of(np.array([True, False, True]))
+    assert (np.sort(some.order) == np.sort(anew)).all()
+    inner = batch.vertex_piece[order] != 1
+    np.testing.assert_array_equal(some.vertices[some.order], batch.vertices[order][inner])
+
+
 @pytest.mark.parametrize("shuffled", [False, True])
 def test_however_a_regular_mesh_is_numbered_its_order_leaves_little_fill(shuffled):
     # halved again and again, as subdivision does: its vertices are numbered level by level
