@@ -25,9 +25,8 @@ from .untangling import untangled
 
 PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
 PINS_FLIP = "no map without flips was found with these pins: unpin some, or move them"
-_NEAR = 1.5  # the energy of a start from which the refinement alone soon arrives,
-_LARGE = 30_000  # vertices of a piece, from which on an iteration is so much cheaper than a step that this is
-_NEARER = 1.2  # instead
+_NEAR = 2.5  # the energy of a start from which the refinement alone soon arrives
+_BY_ANGLES = 0.5  # the balance above which conformal maps are nearer to the best than rigid triangles lead
 _LONG = 1.5  # the squared outline from which on it may well cross itself, relative to that of a disk of the same area
 _IN_AIR = 5000  # vertices of the pieces that are improved together with air around them
 _LEADS = 12  # times that pins are moved on, before their island begins anew
@@ -102,7 +101,8 @@ class Course(Improvement):
             live.uv, _ = live.domain.recalled(live.uv, self.best, np.ones(len(live.pieces), bool))
             yield from self.improve(live)
         else:
-            yield from self._freely(self.best.copy(), np.ones(self.batch.surface.piece_count, bool))
+            everything = np.ones(self.batch.surface.piece_count, bool)
+            yield from self._freely(self.best.copy(), everything, ~everything)
 
     # Starts
 
@@ -161,7 +161,7 @@ class Course(Improvement):
         """With outlines that are free."""
         batch, settings = self.batch, self.settings
         surface, p = batch.surface, batch.surface.piece_count
-        start, certified, to_lead = batch.start, None, np.zeros(p, bool)
+        start, certified, to_lead, new = batch.start, None, np.zeros(p, bool), np.zeros(p, bool)
         directly = np.full(p, settings.initial == "AUTO" or not settings.iterations)
         if settings.initial == "AUTO":
             good = batch.has_pins & ~wrong_pieces([surface], start)
@@ -181,33 +181,38 @@ class Course(Improvement):
             start, certified = np.where(batch.rows(to_lead)[:, None], start, placed), None
         yield PART
         self._begin(start)
-        yield from self._freely(start, directly, certified)
+        yield from self._freely(start, directly, new, certified)
 
-    def _freely(self, start: np.ndarray, directly: np.ndarray, certified: np.ndarray | None = None) -> Steps:
+    def _freely(
+        self, start: np.ndarray, directly: np.ndarray, new: np.ndarray, certified: np.ndarray | None = None
+    ) -> Steps:
         """Improve free maps; `directly`, (p,) bool, without iterations and air where the refinement soon arrives.
 
-        It may be known for which pieces (p,) the start is `certified`.
+        Maps that are `new`, (p,) bool, have been nowhere near the end.  It may be known for which pieces (p,) the start
+        is `certified`.
         """
         batch, settings = self.batch, self.settings
         surface, p = batch.surface, batch.surface.piece_count
         if not self.refining and not settings.iterations:
             yield STEP
             return
-        near = done = np.zeros(p, bool)
+        near = done = rigidly = np.zeros(p, bool)
         if self.refining:
             value = energies(surface, start, settings.balance)
-            size = np.diff(surface.vertex_starts, append=len(start))
-            soon = value < np.where(size < _LARGE, _NEAR, _NEARER)
+            soon = value < _NEAR
             if soon.any():
                 certified = certified_pieces(surface, start) if certified is None else certified
                 done = certified & (value <= ISOMETRIC) & ~batch.apart(start)
-                near = certified & soon & ~done & ~batch.has_hold & directly
+                near = certified & soon & ~done & ~batch.has_hold
+                rigidly = near & new & (settings.balance <= _BY_ANGLES)
+                near &= directly
         self.converged |= done
         if (done | near).any():
             yield STEP
         if near.any():
             winding = surface.outline_lengths**2 > _LONG * 4 * np.pi
-            yield from self.refine(self._group(near, start, loose), watched=bool((winding & near).any()))
+            group = self._group(near, start, loose)
+            yield from self.refine(group, watched=bool((winding & near).any()), rigidly=bool((rigidly & near).any()))
             part = surface if near.all() else surface.of(near)
             certain = np.zeros(p, bool)
             certain[near] = certified_pieces(part, self.placed(self.best[batch.rows(near)], near, part))
@@ -222,10 +227,11 @@ class Course(Improvement):
                 for k in np.flatnonzero(again):
                     self.changes[k] = []
         far = ~(done | near)
-        if far.any():
-            yield from self._in_air(far, start.copy())
+        for chosen in (far & rigidly, far & ~rigidly):
+            if chosen.any():
+                yield from self._in_air(chosen, start.copy(), rigidly=bool(rigidly[chosen].any()))
 
-    def _in_air(self, pieces: np.ndarray, start: np.ndarray, following: bool = False) -> Steps:
+    def _in_air(self, pieces: np.ndarray, start: np.ndarray, following: bool = False, rigidly: bool = False) -> Steps:
         """Improve the maps of the chosen pieces with air around them, or with their outlines as they are.
 
         Where pins are elsewhere than in the `start`, it is led after them first, and if `following`, everywhere.
@@ -255,6 +261,8 @@ class Course(Improvement):
             group = self._group(within, start, make)
             if following or (apart & within).any():
                 yield from self._led(group)
+            elif rigidly:
+                yield from self.refine(group, rigidly=True)
             else:
                 yield from self.improve(group)
         if missing.any():

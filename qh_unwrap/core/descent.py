@@ -13,10 +13,11 @@ from collections.abc import Callable, Generator
 import numpy as np
 
 from .domain import Domain
-from .energy import Barrier
+from .energy import Barrier, map_scale
 from .stepping import PART
 
-_LONGEST = 0.9  # of the step at which a triangle collapses
+_LONGEST = 0.9  # of the step at which a triangle collapses,
+_FARTHEST = 0.75  # or where all that it leaves is still far from the end
 _ARMIJO = 1e-4  # of the decrease that the slope promises, the least that is taken
 _HALVINGS = 20  # of the step, at most
 _PROMISING = 0.6  # of what the slope promises: a decrease by more is worth a longer step
@@ -41,10 +42,11 @@ class Descent:
     balance : as in `Settings`
     size : (p,), the scale of each piece's map that the energy aims at
     patience : how much smaller gains than usual are worth a step
+    rigidly : whether to begin by laying triangles out as they are, as far as they let one another
     """
 
-    def __init__(self, balance: float, size: np.ndarray, patience: float = 1.0):
-        self._balance, self._size, self._patience = balance, size, patience
+    def __init__(self, balance: float, size: np.ndarray, patience: float = 1.0, rigidly: bool = False):
+        self._balance, self._size, self._patience, self._rigidly = balance, size, patience, rigidly
         self._energy: Barrier | None = None
         self._residual = np.full(len(size), _RESIDUAL)
         self._little = np.zeros(len(size), bool)  # whether the last step brought little,
@@ -52,7 +54,7 @@ class Descent:
 
     def of(self, pieces: np.ndarray) -> Descent:
         """The same of the chosen pieces (p,) bool alone."""
-        part = Descent(self._balance, self._size[pieces], self._patience)
+        part = Descent(self._balance, self._size[pieces], self._patience, self._rigidly)
         part._residual, part._little = self._residual[pieces], self._little[pieces]
         part._hindered = self._hindered[pieces]
         return part
@@ -75,6 +77,11 @@ class Descent:
         if not sound.all():
             some = yield from self._step_of_some(domain, uv, going, sound)
             return uv, *some
+        if self._rigidly:
+            yield PART
+            after = _laid_out(domain, energy, uv, before, start, going)
+            self._rigidly, self._energy, self._size = False, None, map_scale(domain.island, after)
+            return uv, after, np.zeros(len(start), bool)
         gradient, beside, own = _newton_equations(domain, energy, before)
         yield PART
         direction = domain.constrained.newton_direction(gradient, beside, own, self._residual)
@@ -104,7 +111,8 @@ class Descent:
         descent = self.of(sound)
         _, its_uv, its_done = yield from descent.step(part, its_uv, going[sound])
         self._residual[sound], self._little[sound] = descent._residual, descent._little
-        self._hindered[sound] = descent._hindered
+        self._hindered[sound], self._size[sound] = descent._hindered, descent._size
+        self._rigidly = descent._rigidly
         done = np.ones(len(sound), bool)
         done[sound] = its_done
         after = uv.copy()
@@ -125,13 +133,33 @@ def descended(
     return _moved(domain, energy, uv, jacobian, start, going, gradient, direction)[:3]
 
 
-def _moved(domain, energy, uv, jacobian, start, going, gradient, direction):
+def _laid_out(domain, energy, uv, jacobian, start, going):
+    """The map after all triangles are laid out in their shapes at rest, turned as they are, and joined with the least
+    change (the local and the global step of Liu et al. 2008), or as far on the way there as the energy falls.
+
+    From a conformal map it leads most of the way to the best, for the price of its start.
+    """
+    *by_corner, stiffness = energy.pull(jacobian)
+    gradient = _gathered(energy.corners, by_corner, len(uv))
+    triangles = domain.triangles
+    beside = np.bincount(triangles.half_edge_edges, stiffness.ravel(), len(triangles.edges))
+    (own,) = _own([beside], triangles.edges, len(uv))
+    direction = domain.constrained.direction(gradient, beside, own)
+    return _moved(domain, energy, uv, jacobian, start, going, np.zeros_like(uv), direction, longest=_FARTHEST)[0]
+
+
+def _gathered(corners, by_corner, n):
+    """Vectors at the vertices, (n, 2), that sum up those of the triangles' corners, (3, m) each."""
+    return np.array([np.bincount(corners.ravel(), values.ravel(), n) for values in by_corner]).T
+
+
+def _moved(domain, energy, uv, jacobian, start, going, gradient, direction, longest=_LONGEST):
     """The map after a step of the right length, the energy of every piece, which have moved, and the slope of the
     energy and the longest step that were looked at, (p,) each."""
     change = energy.jacobian(direction)
     piece = domain.vertex_piece
     slope = np.bincount(piece, np.einsum("nc,nc->n", gradient, direction), len(start))
-    limit = np.where(going, _LONGEST * energy.longest_step(jacobian, change), 0.0)
+    limit = np.where(going, longest * energy.longest_step(jacobian, change), 0.0)
     length, value = _search(
         lambda length: energy.value(jacobian + domain.triangles.at(length) * change), start, slope, limit
     )
@@ -175,15 +203,20 @@ def _newton_equations(domain, energy, jacobian):
     n, edges = len(domain.vertex_piece), domain.triangles.edges
     corners, k = energy.corners, len(edges)
     *by_corner, mean, difference, symmetric, anti = energy.derivatives(jacobian)
-    gradient = np.array([np.bincount(corners.ravel(), values.ravel(), n) for values in by_corner]).T
+    gradient = _gathered(corners, by_corner, n)
     gradient[domain.constrained.held] = 0
     for c, block in enumerate(anti):  # transposed where seen from the larger vertex
         np.negative(block, out=block, where=corners[c] > corners[(c + 1) % 3])
     of = domain.triangles.half_edge_edges
     beside = [np.bincount(of, part.ravel(), k) for part in (mean, difference, symmetric, anti)]
+    return gradient, beside, _own(beside[:3], edges, n)
+
+
+def _own(beside, edges, n):
+    """What the Hessian has at the vertices, (n,) each, where it has `beside` at the edges (k, 2)."""
     one, other = edges.T
     # Moving all vertices together changes nothing.
-    own = [-np.bincount(one, part, n) - np.bincount(other, part, n) for part in beside[:3]]
+    own = [-np.bincount(one, part, n) - np.bincount(other, part, n) for part in beside]
     # What hangs on the rest by nothing but folded faces without area has no equation of its own: it stays.
     own[0] = np.where(own[0] > 0, own[0] * (1 + _SPRING), 1.0)
-    return gradient, beside, own
+    return own

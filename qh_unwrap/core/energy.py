@@ -18,6 +18,7 @@ from .triangles import by_parts, corners_of, hat_gradients, signed_areas
 ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
 AIR = 0.25  # air weighs so many times the geometric mean of the energy and of what it lies above its least value,
 _THIN = 1e-4  # or this where it lies hardly above that
+_LIGHTER = 0.3  # times as much it weighs where all triangles are laid out at once
 _FOLLOWING = [1, 2, 0]  # corners
 _SMALLEST = 1e-9  # eigenvalue of the Hessian of a triangle of unit weight
 
@@ -174,6 +175,16 @@ class Barrier:
             *self._own,
         )
 
+    def pull(self, jacobian: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What pulls every triangle to its shape at rest, turned as in the map: the gradient of half its squared
+        distance from that (Liu et al. 2008) by the corners' u and v, and that energy's Hessian, the same in u and v, of
+        the corners c and c + 1: (3, m) each.  Air weighs less here: it gives way more than its triangles can follow.
+        """
+        weight = self._weight.copy()
+        for _, part in self._air:
+            weight[part] *= _LIGHTER
+        return by_parts(_pull, jacobian, self._hats, weight)
+
     def _density(self, s1, s2):
         """The density of triangles with the stretches s1 and s2, (m,), and its first and second derivatives by s1 and
         s2, divided by the density itself."""
@@ -231,6 +242,18 @@ def _derivatives(jacobian, hats, weight, density):
         difference * cos - symmetric * sin,
         difference * sin + symmetric * cos,
         (f12 - skew) * (other - one),
+    )
+
+
+def _pull(jacobian, hats, weight):
+    (a, b), (c, d) = jacobian
+    (cos, sin), _ = _direction(a + d, c - b)
+    h1, h2 = _with_first(hats[:, 0]), _with_first(hats[:, 1])
+    along, across = weight * h1, weight * h2
+    return (
+        (a - cos) * along + (b + sin) * across,
+        (c - sin) * along + (d - cos) * across,
+        along * h1[_FOLLOWING] + across * h2[_FOLLOWING],
     )
 
 

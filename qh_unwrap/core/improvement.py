@@ -192,14 +192,14 @@ class Improvement:
         if sound.any():
             yield from self.refine(group.of(sound))
 
-    def refine(self, group: Group, watched: bool = False) -> Steps:
+    def refine(self, group: Group, watched: bool = False, rigidly: bool = False) -> Steps:
         """Newton's steps, in every piece as long as they pay.
 
         Pieces that are `watched` stop where their outlines come to cross themselves in the first step, as most that do.
         """
         settings = self.settings
         yield PART
-        descent = Descent(settings.balance, map_scale(group.domain.island, group.island_uv), self.patience)
+        descent = Descent(settings.balance, map_scale(group.domain.island, group.island_uv), self.patience, rigidly)
         going = np.ones(len(group.pieces), bool)
         self.unfinished[group.pieces] = False
         folded = _folded(group)

@@ -265,10 +265,7 @@ class Constrained:
         if self.held.all():
             return direction
         hessian = self._hessian(beside, own)
-        if self.alike:
-            rhs = -self.unknowns[0].gathered(gradient)
-        else:
-            rhs = -np.concatenate([self.unknowns[c].gathered(gradient[:, c]) for c in (0, 1)])[:, None]
+        rhs = self._downhill(gradient)
         solution, missed = np.zeros_like(rhs), True
         tried = self._mean is not None
         if tried:  # that of an earlier matrix may still do
@@ -285,6 +282,23 @@ class Constrained:
         self._scattered(solution, direction)
         return direction
 
+    def direction(self, gradient: np.ndarray, beside: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """The same for a Hessian that is alike in both coordinates and does not mix them: `beside` (k,) is the mean
+        part at the edges, `own` (n,) that at the vertices.
+        """
+        direction = np.zeros(gradient.shape)
+        if self.held.all():
+            return direction
+        factors = [self._factors(c, beside, own) for c in range(len(self.unknowns))]
+        self._scattered(self._solved(factors, self._downhill(gradient)), direction)
+        return direction
+
+    def _downhill(self, gradient):
+        """Against the gradient (n, 2), for the unknowns, as conjugate gradients take them."""
+        if self.alike:
+            return -self.unknowns[0].gathered(gradient)
+        return -np.concatenate([self.unknowns[c].gathered(gradient[:, c]) for c in (0, 1)])[:, None]
+
     def _scattered(self, solution, out):
         if self.alike:
             self.unknowns[0].spread(solution, out)
@@ -294,12 +308,16 @@ class Constrained:
                 self.unknowns[c].spread(values, out[:, c])
 
     def _preconditioner(self, c, beside, own):
+        """The factors of one coordinate's own matrix; of both, if they are alike, the mean's."""
         m, d = (beside[0], own[0]), (beside[1], own[1])
         if not self.alike:
             sign = 1 - 2 * c
             m = m[0] + sign * d[0], m[1] + sign * d[1]
+        return self._factors(c, *m)
+
+    def _factors(self, c, beside, own):
         pattern = self.patterns[c]
-        return self._factorizer(pattern.matrix(m[0], m[0], m[1]), self._is_alone(_LARGE))
+        return self._factorizer(pattern.matrix(beside, beside, own), self._is_alone(_LARGE))
 
     def _hessian(self, beside: Sequence[np.ndarray], own: Sequence[np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
         """The product of the Hessian with values of the unknowns, shaped as these."""
@@ -322,12 +340,12 @@ class Constrained:
 
         return product
 
-    def _preconditioned(self, rest):
+    def _solved(self, factors, rest):
         if self.alike:
-            return self._mean[0].solve(rest)
+            return factors[0].solve(rest)
         first = len(self.unknowns[0])
-        halves = zip(self._mean, (rest[:first], rest[first:]), strict=True)
-        return np.concatenate([factors.solve(half) for factors, half in halves])
+        halves = zip(factors, (rest[:first], rest[first:]), strict=True)
+        return np.concatenate([each.solve(half) for each, half in halves])
 
     def _conjugate_gradients(self, product, rhs, solution, residual, steps):
         """A solution and whether it misses the `residual` somewhere; every piece takes steps of its own length."""
@@ -352,7 +370,7 @@ class Constrained:
         for _ in range(steps):
             if not np.any(unfinished):
                 break
-            improved = self._preconditioned(rest)
+            improved = self._solved(self._mean, rest)
             new = dot(rest, improved)
             if search is None:
                 search = improved

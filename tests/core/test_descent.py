@@ -7,10 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qh_unwrap.core import Settings, Surface, distortion, unwrap
+from qh_unwrap.core.certificate import wrong_pieces
 from qh_unwrap.core.delaunay import triangulate
 from qh_unwrap.core.descent import Descent
 from qh_unwrap.core.domain import Fixed, Held, Plane, airs_around, loose
-from qh_unwrap.core.energy import Barrier, energies
+from qh_unwrap.core.energy import Barrier, energies, map_scale
+from qh_unwrap.core.flattening import conformal
+from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.stepping import finished
 
 from . import shapes
@@ -63,6 +66,79 @@ def test_the_hessian_is_that_of_the_energy_where_it_is_positive():
     assert quadratic == pytest.approx((values[0] - 2 * values[1] + values[2]) / step**2, rel=1e-2)
 
 
+def apart_from_rest(jacobian, weight):
+    """Half the squared distance of all triangles from their shapes at rest, turned as in the map, without flips."""
+    matrices = jacobian.transpose(2, 0, 1)
+    left, _, right = np.linalg.svd(matrices)
+    return (weight * ((matrices - left @ right) ** 2).sum(axis=(1, 2))).sum() / 2
+
+
+@given(seeds)
+def test_the_pull_is_the_derivative_of_the_distance_from_rest(seed):
+    surface, uv, direction = bent(seed)
+    barrier = Barrier(unheld(surface, uv), uv, 0.25, np.array([1.3]))
+    *pull, stiffness = barrier.pull(barrier.jacobian(uv))
+    step, corners, weight = 1e-6, surface.triangles.T, surface.barrier / surface.barrier.sum()
+    values = [apart_from_rest(barrier.jacobian(uv + side * step * direction), weight) for side in (-1, 1)]
+    slope = sum((each * direction[corners, c]).sum() for c, each in enumerate(pull))
+    assert slope == pytest.approx((values[1] - values[0]) / (2 * step), rel=1e-4, abs=1e-6)
+    # With the turns as they are, the distance is a parabola.
+    apart = direction[corners] - direction[np.roll(corners, -1, axis=0)]
+    curvature = (weight * (barrier.jacobian(direction) ** 2).sum(axis=(0, 1))).sum()
+    assert -(stiffness * (apart**2).sum(axis=2)).sum() == pytest.approx(curvature)
+
+
+def test_laid_out_in_their_shapes_triangles_of_a_flat_surface_fit_at_once():
+    vertices, triangles = shapes.random_disk(6)
+    surface = Surface(vertices, triangles)
+    uv = surface.vertices[:, :2] * [1.3, 0.8]
+    domain = loose(surface, uv, None)
+    descending = Descent(0.25, np.ones(1), rigidly=True)
+    _, uv, done = finished(descending.step(domain, uv, np.ones(1, bool)))
+    assert energies(surface, uv, 0.25) == pytest.approx(1, abs=1e-9) and not done.any()
+    _, uv, done = finished(descending.step(domain, uv, np.ones(1, bool)))
+    assert done.all(), "the next step is Newton's, and brings nothing"
+
+
+@pytest.mark.parametrize("in_air", [False, True])
+def test_from_a_conformal_map_rigid_triangles_lead_most_of_the_way(in_air):
+    vertices, triangles = shapes.bump(4, inner=300, outer=50, height=0.8)
+    surface = Surface(vertices, triangles)
+    uv, going = conformal(surface), np.ones(1, bool)
+    best = energies(surface, unwrap(vertices, triangles).uv, 0.25)
+    fixed = Fixed(np.zeros(uv.shape, bool), uv)
+    domain = Plane(surface, uv, fixed, airs_around(surface, uv, triangulate), triangulate)
+    domain = domain if in_air else loose(surface, uv, None)
+    _, after, _ = finished(Descent(0.25, map_scale(surface, uv), rigidly=True).step(domain, domain.start(uv), going))
+    before, laid_out = (energies(surface, each[: len(uv)], 0.25) for each in (uv, after))
+    assert before > best + 0.04
+    assert best < laid_out < best + 0.2 * (before - best)
+
+
+def test_rigid_triangles_flip_nothing_and_never_raise_the_energy():
+    for seed in range(20):
+        surface, uv = squashed(seed, 0.05)
+        going = np.ones(1, bool)
+        domain = loose(surface, uv, None)
+        _, after, _ = finished(Descent(0.25, np.ones(1), rigidly=True).step(domain, uv, going))
+        assert energies(surface, after, 0.25) <= energies(surface, uv, 0.25)
+
+
+def test_beside_a_piece_with_flips_others_begin_rigidly_once():
+    one, other = shapes.random_disk(6), shapes.random_disk(7)
+    surface = Surface(*joined([one[0], other[0]], [one[1], other[1]]))
+    uv = surface.vertices[:, :2] * [1.3, 0.8]
+    first = np.flatnonzero(surface.vertex_piece == 1)[0]
+    uv[first] += 3
+    assert wrong_pieces([surface], uv).tolist() == [False, True]
+    domain, descending, going = loose(surface, uv, None), Descent(0.25, np.ones(2), rigidly=True), np.ones(2, bool)
+    _, after, done = finished(descending.step(domain, uv, going))
+    assert done.tolist() == [False, True]
+    np.testing.assert_array_equal(after[surface.vertex_piece == 1], uv[surface.vertex_piece == 1])
+    *_, done = finished(descending.step(domain, after, going))
+    assert done.all()
+
+
 def test_steps_lower_the_energy_and_flip_nothing():
     vertices, triangles = shapes.bump(4, inner=300, outer=50, height=2)
     surface = Surface(vertices, triangles)
@@ -94,10 +170,10 @@ def squashed(seed, part):
 def test_far_from_the_end_steps_go_farther_than_newton_s():
     surface, uv = squashed(8, 1e-3)
     domain, going = loose(surface, uv, None), np.ones(1, bool)
-    descent = Descent(0.25, np.ones(1))
+    descending = Descent(0.25, np.ones(1))
     values = [energies(surface, uv, 0.25)[0]]
     for _ in range(6):
-        _, uv, _ = finished(descent.step(domain, uv, going))
+        _, uv, _ = finished(descending.step(domain, uv, going))
         values.append(energies(surface, uv, 0.25)[0])
     # Newton's own length would divide the energy by 16 / 9 in each.
     assert values[-1] < values[0] / 100

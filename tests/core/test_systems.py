@@ -160,14 +160,22 @@ def test_constrained_directions_equal_dense_ones(kind, pieces):
     beside, own, matrix = random_blocks(surface.edges, n, 7)
     gradient = np.random.default_rng(8).normal(size=(n, 2))
     constrained = Constrained(surface.order, surface.edges, held, values, partner, surface.vertex_piece)
-    found = constrained.newton_direction(gradient, beside, own, 1e-10)
     basis = np.zeros((n, 2, 0))
     for c in (0, 1):
         _, its = freedom(held[:, c], values[:, c], None if partner is None else partner[:, c])
         basis = np.concatenate([basis, its[:, None] * np.eye(2)[c, :, None]], axis=2)
     basis = basis.reshape(2 * n, -1)
-    unknowns = np.linalg.solve(basis.T @ matrix @ basis, -basis.T @ gradient.ravel())
-    np.testing.assert_allclose(found.ravel(), basis @ unknowns, atol=1e-9)
+    alike = np.zeros((n, 2, n, 2))
+    (i, j), k = surface.edges.T, np.arange(n)
+    for c in (0, 1):
+        alike[i, c, j, c] = alike[j, c, i, c] = beside[0]
+        alike[k, c, k, c] = own[0]
+    for found, its in (
+        (constrained.newton_direction(gradient, beside, own, 1e-10), matrix),
+        (constrained.direction(gradient, beside[0], own[0]), alike.reshape(2 * n, 2 * n)),
+    ):
+        unknowns = np.linalg.solve(basis.T @ its @ basis, -basis.T @ gradient.ravel())
+        np.testing.assert_allclose(found.ravel(), basis @ unknowns, atol=1e-9)
 
 
 def rows_of(beside, diagonal):
