@@ -26,6 +26,10 @@ _LENGTHENINGS = 4  # of the step, at most
 _NEGLIGIBLE = 1e-3  # a decrease smaller than this, relative to the energy, is not worth another step,
 _LITTLE = 2e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
 _INVISIBLE = 1e-6  # a decrease of the energy that nobody could see
+_ROOMY = 4  # times as long a step would collapse no triangle: then it
+_TRUE = 0.1  # as nearly brings what it promised: then the next one brings half of the difference,
+_TRUEST = 0.02  # or of so much of what was promised, at most:
+_MORE = 0.3  # so little, relative to a decrease that is worth a step, is not worth it
 _CUT = 0.8  # of Newton's own step: one that ends before is cut short
 _SPRING = 1e-9  # that holds every vertex in its place, relative to what acts on it
 _RESIDUAL = 0.03  # of Newton's equations, relative to the gradient,
@@ -90,11 +94,16 @@ class Descent:
         hard = (limit < _SHORT) | (value > _EXTREME * energy.least)
         self._residual, self._hindered = np.where(hard, _SHARP, _RESIDUAL), going & (limit < _CUT)
         worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
-        little = start - value < worth / self._patience
+        worth, drop, promised = worth / self._patience, start - value, -slope / 2
+        little = drop < worth
         # What was cut short and promised more gets another step.
-        hindered = (limit < 1) & (-slope / 2 > worth) & ~self._little
+        hindered = (limit < 1) & (promised > self._patience * worth) & ~self._little
         self._little = little
-        return uv, after, ~moved | (little & ~hindered)
+        # Where a step has brought what Newton's equations promised, the next one brings far less.
+        surprise = np.abs(drop - promised)
+        near = (limit > _ROOMY) & (surprise < _TRUE * promised)
+        near &= np.maximum(surprise, _TRUEST * promised) < _MORE * worth
+        return uv, after, ~moved | (little & ~hindered) | near
 
     def _energy_of(self, domain, uv):
         """The energy with its air as in `uv`; what does not depend on that serves on."""

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qh_unwrap.core import Settings, Surface, distortion, unwrap
+from qh_unwrap.core import Settings, Surface, descent, distortion, unwrap
 from qh_unwrap.core.certificate import wrong_pieces
 from qh_unwrap.core.delaunay import triangulate
 from qh_unwrap.core.descent import Descent
@@ -137,6 +137,17 @@ def test_beside_a_piece_with_flips_others_begin_rigidly_once():
     np.testing.assert_array_equal(after[surface.vertex_piece == 1], uv[surface.vertex_piece == 1])
     *_, done = finished(descending.step(domain, after, going))
     assert done.all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_last_step_is_left_out_where_the_one_before_kept_its_promise(seed, monkeypatch):
+    mesh = shapes.bump(seed, inner=300, outer=50, height=0.8)
+    result = unwrap(*mesh)
+    monkeypatch.setattr(descent, "_TRUE", 0)
+    longer = unwrap(*mesh)
+    assert result.report.converged and len(result.report.changes) < len(longer.report.changes)
+    found, best = (energies(Surface(*mesh), each.uv, 0.25) for each in (result, longer))
+    assert found == pytest.approx(best, rel=1e-4)
 
 
 def test_steps_lower_the_energy_and_flip_nothing():
