@@ -40,8 +40,10 @@ def local_order(n: int, edges: np.ndarray, group: np.ndarray | None = None) -> n
 
 def _banded(n, edges):
     """Neighbours soon after one another."""
-    graph = coo_array((np.ones(len(edges), np.int8), tuple(edges.T)), shape=(n, n))
-    return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
+    i, j = edges.T.astype(np.int32)
+    both = np.concatenate([i, j]), np.concatenate([j, i])
+    graph = coo_array((np.ones(2 * len(i), np.int8), both), shape=(n, n)).tocsr()
+    return reverse_cuthill_mckee(graph, symmetric_mode=True).astype(np.int64)
 
 
 def _by_minimum_degree(n, edges):
