@@ -26,10 +26,12 @@ _LENGTHENINGS = 4  # of the step, at most
 _NEGLIGIBLE = 1e-3  # a decrease smaller than this, relative to the energy, is not worth another step,
 _LITTLE = 2e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
 _INVISIBLE = 1e-6  # a decrease of the energy that nobody could see
-_ROOMY = 4  # times as long a step would collapse no triangle: then it
-_TRUE = 0.1  # as nearly brings what it promised: then the next one brings half of the difference,
-_TRUEST = 0.02  # or of so much of what was promised, at most:
-_MORE = 0.28  # so little, relative to a decrease that is worth a step, is not worth it
+_ROOMY = 4  # times Newton's own step may be until a triangle collapses: then it is short,
+_TRUE = 0.1  # of what it promises, by which it may miss that and keep its promise,
+_TRUEST = 0.05  # and by which it counts as missing it at least;
+_OF_SURPRISE = 1 / 3  # of that difference the next step brings, or
+_OF_TREND = 1 / 2  # of what it would bring if decreases shrank as they did,
+_LEFT = 0.094  # and is left out if that is so little of a decrease that is worth a step
 _CUT = 0.8  # of Newton's own step: one that ends before is cut short
 _SPRING = 1e-9  # that holds every vertex in its place, relative to what acts on it
 _RESIDUAL = 0.03  # of Newton's equations, relative to the gradient,
@@ -53,14 +55,15 @@ class Descent:
         self._balance, self._size, self._patience, self._rigidly = balance, size, patience, rigidly
         self._energy: Barrier | None = None
         self._residual = np.full(len(size), _RESIDUAL)
-        self._little = np.zeros(len(size), bool)  # whether the last step brought little,
+        self._drop = np.full(len(size), np.inf)  # of the energy in the last step,
+        self._little = np.zeros(len(size), bool)  # whether that brought little,
         self._hindered = np.ones(len(size), bool)  # and whether it was cut short
 
     def of(self, pieces: np.ndarray) -> Descent:
         """The same of the chosen pieces (p,) bool alone."""
         part = Descent(self._balance, self._size[pieces], self._patience, self._rigidly)
         part._residual, part._little = self._residual[pieces], self._little[pieces]
-        part._hindered = self._hindered[pieces]
+        part._hindered, part._drop = self._hindered[pieces], self._drop[pieces]
         return part
 
     def step(
@@ -99,10 +102,13 @@ class Descent:
         # What was cut short and promised more gets another step.
         hindered = (limit < 1) & (promised > self._patience * worth) & ~self._little
         self._little = little
+        if energy.in_air:  # which gives way a bit more in every step
+            return uv, after, ~moved | (little & ~hindered)
         # Where a step has brought what Newton's equations promised, the next one brings far less.
-        surprise = np.abs(drop - promised)
-        near = (limit > _ROOMY) & (surprise < _TRUE * promised)
-        near &= np.maximum(surprise, _TRUEST * promised) < _MORE * worth
+        surprise = np.maximum(np.abs(drop - promised), _TRUEST * promised)
+        next_drop = np.maximum(_OF_SURPRISE * surprise, _OF_TREND * drop * (drop / self._drop))
+        near = (limit > _ROOMY) & (surprise < _TRUE * promised) & (next_drop < _LEFT * worth)
+        self._drop = np.maximum(drop, np.finfo(float).tiny)
         return uv, after, ~moved | (little & ~hindered) | near
 
     def _energy_of(self, domain, uv):
@@ -121,6 +127,7 @@ class Descent:
         _, its_uv, its_done = yield from descent.step(part, its_uv, going[sound])
         self._residual[sound], self._little[sound] = descent._residual, descent._little
         self._hindered[sound], self._size[sound] = descent._hindered, descent._size
+        self._drop[sound] = descent._drop
         self._rigidly = descent._rigidly
         done = np.ones(len(sound), bool)
         done[sound] = its_done

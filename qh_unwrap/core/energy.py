@@ -110,6 +110,11 @@ class Barrier:
             for chart, part in self._air:
                 self._weight[part] = chart.barrier * self._at(weight / np.maximum(counts, 1), chart)
 
+    @property
+    def in_air(self) -> bool:
+        """Whether air takes part."""
+        return bool(self._air)
+
     def _at(self, values, chart):
         """The values (p,) of the pieces at a chart's triangles, (m,), or the one that there is."""
         return values[0] if self._single else values[chart.piece]

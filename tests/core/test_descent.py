@@ -16,6 +16,7 @@ from qh_unwrap.core.flattening import conformal
 from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.stepping import finished
 
+from ..benchmarks.generated import hundred
 from . import shapes
 from .test_tensor import seeds
 
@@ -137,6 +138,13 @@ def test_beside_a_piece_with_flips_others_begin_rigidly_once():
     np.testing.assert_array_equal(after[surface.vertex_piece == 1], uv[surface.vertex_piece == 1])
     *_, done = finished(descending.step(domain, after, going))
     assert done.all()
+
+
+def test_air_gives_way_step_by_step():
+    vertices, triangles = hundred()["spiral 7"]  # every step keeps its promise, and is followed by others
+    ended = unwrap(vertices, triangles).report
+    stopped = unwrap(vertices, triangles, Settings(refine=15)).report
+    assert ended.after.symmetric_dirichlet < stopped.after.symmetric_dirichlet - 0.003
 
 
 @pytest.mark.parametrize("seed", range(4))
