@@ -25,7 +25,9 @@ from .settings import Settings
 from .stepping import PART, STEP
 from .unfolding import unfolded
 
-_HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement
+_HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement;
+_FAR = 200  # above this energy
+_FAR_HANDOVER = 0.5  # one that lowers it by less than this
 _FOLDED = 0.2  # of a surface's area, that flipped triangles may have for it to be worth unfolding
 _FEW = 0.75  # once only this part of the vertices still moves, the others take part no longer
 
@@ -133,7 +135,8 @@ class Improvement:
             fine = going & valid & ~wrong_pieces([island], self.placed(group.island_uv, group.pieces, island))
             value = np.where(fine, energies(island, group.island_uv, settings.balance), np.inf)
             isometric = fine & self.refining & (value <= ISOMETRIC)
-            enough = fine & self.refining & (number > 0) & (value > (1 - _HANDOVER) * least)
+            handover = np.where(value > _FAR, _FAR_HANDOVER, _HANDOVER)
+            enough = fine & self.refining & (number > 0) & (value > (1 - handover) * least)
             better = fine & (~found | ~uneven | (value < least))
             best = np.where(better[island.vertex_piece, None], group.island_uv, best)
             least = np.where(better, np.where(uneven, value, np.inf), least)
