@@ -102,12 +102,11 @@ class Descent:
         # What was cut short and promised more gets another step.
         hindered = (limit < 1) & (promised > self._patience * worth) & ~self._little
         self._little = little
-        if energy.in_air:  # which gives way a bit more in every step
-            return uv, after, ~moved | (little & ~hindered)
-        # Where a step has brought what Newton's equations promised, the next one brings far less.
+        # Where a step has brought what Newton's equations promised, the next one brings far less; but air gives way a
+        # bit more in every step.
         surprise = np.maximum(np.abs(drop - promised), _TRUEST * promised)
         next_drop = np.maximum(_OF_SURPRISE * surprise, _OF_TREND * drop * (drop / self._drop))
-        near = (limit > _ROOMY) & (surprise < _TRUE * promised) & (next_drop < _LEFT * worth)
+        near = ~energy.in_air & (limit > _ROOMY) & (surprise < _TRUE * promised) & (next_drop < _LEFT * worth)
         self._drop = np.maximum(drop, np.finfo(float).tiny)
         return uv, after, ~moved | (little & ~hindered) | near
 

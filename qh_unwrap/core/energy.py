@@ -111,9 +111,12 @@ class Barrier:
                 self._weight[part] = chart.barrier * self._at(weight / np.maximum(counts, 1), chart)
 
     @property
-    def in_air(self) -> bool:
-        """Whether air takes part."""
-        return bool(self._air)
+    def in_air(self) -> np.ndarray:
+        """Beside which pieces there is air, (p,) bool."""
+        result = np.zeros(len(self._total), bool)
+        for chart, _ in self._air:
+            result[chart.piece] = True
+        return result
 
     def _at(self, values, chart):
         """The values (p,) of the pieces at a chart's triangles, (m,), or the one that there is."""
