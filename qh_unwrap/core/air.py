@@ -24,7 +24,7 @@ _PIECES = 8  # pieces of the circle's radius, of which none of a wall is longer
 _SAMPLES = 5  # points of a wall that the air around keeps its distance from
 _COARSEST = 4  # edges of the coarsest air that reach from the middle to the circle
 _FINEST = 64  # edges of the finest air that reach across the island's radius, at most,
-_COARSER = 2  # times as long as those of the outline
+_COARSER = 4  # times as long as those of the outline
 _UNEVEN = 1e-3  # of a grid's step
 _EVEN = 1e-6  # by the cube of the outline: how little longer sides may lie to one side for no axis to be told by them
 
