@@ -27,14 +27,12 @@ _NEGLIGIBLE = 1e-3  # a decrease smaller than this, relative to the energy, is n
 _LITTLE = 2e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
 _INVISIBLE = 1e-6  # a decrease of the energy that nobody could see
 _ROOMY = 4  # times Newton's own step may be until a triangle collapses: then it is short,
-_TRUE = 0.1  # of what it promises, by which it may miss that and keep its promise,
-_TRUEST = 0.05  # and by which it counts as missing it at least;
-_OF_SURPRISE = 1 / 3  # of that difference the next step brings, or
-_OF_TREND = 1 / 2  # of what it would bring if decreases shrank as they did,
-_LEFT = 0.094  # and is left out if that is so little of a decrease that is worth a step
+_TRUE = 0.2  # of what it promises, by which it may miss that and keep its promise
+_LEFT = 0.5  # of a decrease that is worth a step: less is left to old equations
 _CUT = 0.8  # of Newton's own step: one that ends before is cut short
 _SPRING = 1e-9  # that holds every vertex in its place, relative to what acts on it
-_RESIDUAL = 0.03  # of Newton's equations, relative to the gradient,
+_ROUGH = 0.1  # residual of old equations, relative to the gradient,
+_RESIDUAL = 0.03  # of new ones,
 _SHARP = 0.002  # and where few triangles rule the gradient, so that the others go where they should not:
 _SHORT = 0.5  # after a step that one that all but collapses has made shorter than this,
 _EXTREME = 20  # or above so many times the least possible energy
@@ -102,12 +100,14 @@ class Descent:
         # What was cut short and promised more gets another step.
         hindered = (limit < 1) & (promised > self._patience * worth) & ~self._little
         self._little = little
-        # Where a step has brought what Newton's equations promised, the next one brings far less; but air gives way a
-        # bit more in every step.
-        surprise = np.maximum(np.abs(drop - promised), _TRUEST * promised)
-        next_drop = np.maximum(_OF_SURPRISE * surprise, _OF_TREND * drop * (drop / self._drop))
-        near = ~energy.in_air & (limit > _ROOMY) & (surprise < _TRUE * promised) & (next_drop < _LEFT * worth)
+        # A step that has brought what it promised is followed by one that brings far less, for which its equations will
+        # do once more; but air gives way a bit more in every step.
+        surprise = np.abs(drop - promised)
+        near = ~energy.in_air & (limit > _ROOMY) & (surprise < _TRUE * promised)
+        near &= ~little & (np.maximum(surprise, drop * (drop / self._drop)) < _LEFT * worth)
         self._drop = np.maximum(drop, np.finfo(float).tiny)
+        if near.any():
+            after = _polished(domain, energy, after, near)
         return uv, after, ~moved | (little & ~hindered) | near
 
     def _energy_of(self, domain, uv):
@@ -161,6 +161,23 @@ def _laid_out(domain, energy, uv, jacobian, start, going):
     (own,) = _own([beside], triangles.edges, len(uv))
     direction = domain.constrained.direction(gradient, beside, own)
     return _moved(domain, energy, uv, jacobian, start, going, np.zeros_like(uv), direction, longest=_FARTHEST)[0]
+
+
+def _polished(domain, energy, uv, going):
+    """The map after another step with the last one's Hessian, in the pieces that are `going` (p,) bool."""
+    jacobian = energy.jacobian(uv)
+    start = energy.value(jacobian)
+    gradient = _gradient(domain, energy, energy.derivatives(jacobian)[:2])
+    gradient[~going[domain.vertex_piece]] = 0
+    direction = domain.constrained.next_direction(gradient, _ROUGH)
+    return _moved(domain, energy, uv, jacobian, start, going, gradient, direction)[0]
+
+
+def _gradient(domain, energy, by_corner):
+    """The gradient (n, 2) of what the triangles have `by_corner`, zero where held."""
+    gradient = _gathered(energy.corners, by_corner, len(domain.vertex_piece))
+    gradient[domain.constrained.held] = 0
+    return gradient
 
 
 def _gathered(corners, by_corner, n):
@@ -218,8 +235,7 @@ def _newton_equations(domain, energy, jacobian):
     n, edges = len(domain.vertex_piece), domain.triangles.edges
     corners, k = energy.corners, len(edges)
     *by_corner, mean, difference, symmetric, anti = energy.derivatives(jacobian)
-    gradient = _gathered(corners, by_corner, n)
-    gradient[domain.constrained.held] = 0
+    gradient = _gradient(domain, energy, by_corner)
     for c, block in enumerate(anti):  # transposed where seen from the larger vertex
         np.negative(block, out=block, where=corners[c] > corners[(c + 1) % 3])
     of = domain.triangles.half_edge_edges

@@ -181,7 +181,9 @@ class Constrained:
         self.values = values
         self.order, self._factorizer = order, factorizer
         self._group = None if group is None or not len(group) or (group == group[0]).all() else group
-        self._mean: list[Factors] | None = None
+        self._mean: list[Factors] | None = None  # those of the last equations,
+        self._serves_on = False  # and whether they may do for the next,
+        self._product: Callable[[np.ndarray], np.ndarray] | None = None  # and their Hessian
         self._matrix: bsr_array | None = None
         self._all: Pattern | None = None
 
@@ -264,11 +266,11 @@ class Constrained:
         direction = np.zeros(gradient.shape)
         if self.held.all():
             return direction
-        hessian = self._hessian(beside, own)
+        hessian = self._product = self._hessian(beside, own)
         rhs = self._downhill(gradient)
         solution, missed = np.zeros_like(rhs), True
-        tried = self._mean is not None
-        if tried:  # that of an earlier matrix may still do
+        tried = self._serves_on
+        if tried:
             solution, missed = self._conjugate_gradients(hessian, rhs, solution, residual, _PATIENCE)
         if missed:
             self._mean = None  # before there is another: both would take twice the memory
@@ -277,9 +279,17 @@ class Constrained:
             sharper = [factors.sharpened() for factors in self._mean] if missed else []
             if any(sharper):
                 solution, _ = self._conjugate_gradients(hessian, rhs, np.zeros_like(rhs), residual, _STEPS)
-            if tried or not self._is_alone(_LARGE):
-                self._mean = None
+            self._serves_on = self._is_alone(_LARGE) and not tried
         self._scattered(solution, direction)
+        return direction
+
+    def next_direction(self, gradient: np.ndarray, residual: np.ndarray | float) -> np.ndarray:
+        """The same for another gradient, with the Hessian that the last direction was for."""
+        direction = np.zeros(gradient.shape)
+        if self._product is not None:
+            rhs = self._downhill(gradient)
+            solution, _ = self._conjugate_gradients(self._product, rhs, np.zeros_like(rhs), residual, _STEPS)
+            self._scattered(solution, direction)
         return direction
 
     def direction(self, gradient: np.ndarray, beside: np.ndarray, own: np.ndarray) -> np.ndarray:

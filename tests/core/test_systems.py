@@ -170,11 +170,13 @@ def test_constrained_directions_equal_dense_ones(kind, pieces):
     for c in (0, 1):
         alike[i, c, j, c] = alike[j, c, i, c] = beside[0]
         alike[k, c, k, c] = own[0]
-    for found, its in (
-        (constrained.newton_direction(gradient, beside, own, 1e-10), matrix),
-        (constrained.direction(gradient, beside[0], own[0]), alike.reshape(2 * n, 2 * n)),
+    other = np.random.default_rng(9).normal(size=(n, 2))
+    for found, its, against in (
+        (constrained.newton_direction(gradient, beside, own, 1e-10), matrix, gradient),
+        (constrained.next_direction(other, 1e-10), matrix, other),
+        (constrained.direction(gradient, beside[0], own[0]), alike.reshape(2 * n, 2 * n), gradient),
     ):
-        unknowns = np.linalg.solve(basis.T @ its @ basis, -basis.T @ gradient.ravel())
+        unknowns = np.linalg.solve(basis.T @ its @ basis, -basis.T @ against.ravel())
         np.testing.assert_allclose(found.ravel(), basis @ unknowns, atol=1e-9)
 
 
