@@ -27,11 +27,14 @@ def report_overlaps(works, all_works, options):
 def new_overlaps_of(works, all_works):
     """For each of the works, and then for what `layout.left_alone` yields, the numbers among these of what it lies on
     now and did not before.  A generator like `report_overlaps`."""
+    others = list(layout.left_alone(all_works))
+    if len(works) + len(others) < 2:
+        return [[] for _ in works]
     now = [(work.uv / work.aspect)[work.triangles] for work in works]
     before = [work.old_triangles for work in works]
     before = [old if old is None else old / work.aspect for old, work in zip(before, works, strict=True)]
     images = [work.image for work in works]
-    for _, rest, image in layout.left_alone(all_works):
+    for _, rest, image in others:
         now.append(rest)
         before.append(rest)
         images.append(image)
