@@ -94,21 +94,31 @@ class Descent:
         after, value, moved, slope, limit = _moved(domain, energy, uv, before, start, going, gradient, direction)
         hard = (limit < _SHORT) | (value > _EXTREME * energy.least)
         self._residual, self._hindered = np.where(hard, _SHARP, _RESIDUAL), going & (limit < _CUT)
+        done, nearly = self._ends(energy, start, value, -slope / 2, limit)
+        if nearly.any():
+            yield PART
+            after = _polished(domain, energy, after, nearly)
+        return uv, after, ~moved | done | nearly
+
+    def _ends(self, energy, start, value, promised, limit):
+        """Which pieces (p,) bool are done after a step that brought their energies from `start` to `value`, and for
+        which its equations will do once more to end.
+
+        promised  (p,), by how much these would have lowered the energy
+        limit     (p,), the longest step that was looked at
+        """
         worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
-        worth, drop, promised = worth / self._patience, start - value, -slope / 2
-        little = drop < worth
         # What was cut short and promised more gets another step.
-        hindered = (limit < 1) & (promised > self._patience * worth) & ~self._little
-        self._little = little
-        # A step that has brought what it promised is followed by one that brings far less, for which its equations will
-        # do once more; but air gives way a bit more in every step.
-        surprise = np.abs(drop - promised)
-        near = ~energy.in_air & (limit > _ROOMY) & (surprise < _TRUE * promised)
-        near &= ~little & (np.maximum(surprise, drop * (drop / self._drop)) < _LEFT * worth)
-        self._drop = np.maximum(drop, np.finfo(float).tiny)
-        if near.any():
-            after = _polished(domain, energy, after, near)
-        return uv, after, ~moved | (little & ~hindered) | near
+        hindered = (limit < 1) & (promised > worth) & ~self._little
+        drop, worth = start - value, worth / self._patience
+        little = drop < worth
+        # A step that has brought what it promised is followed by one that brings far less; but air gives way a bit more
+        # in every step.
+        surprise, trend = np.abs(drop - promised), drop * (drop / self._drop)
+        true = ~energy.in_air & (limit > _ROOMY) & (surprise < _TRUE * promised)
+        nearly = true & ~little & (np.maximum(surprise, trend) < _LEFT * worth)
+        self._little, self._drop = little, np.maximum(drop, np.finfo(float).tiny)
+        return little & ~hindered, nearly
 
     def _energy_of(self, domain, uv):
         """The energy with its air as in `uv`; what does not depend on that serves on."""
