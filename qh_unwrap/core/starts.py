@@ -16,6 +16,7 @@ from .domain import Fixed, Held
 from .energy import ISOMETRIC, energies
 from .flattening import Flattening, conformal
 from .initial import fit, led, project, weighted_map
+from .loops import followers
 from .rings import ring_map
 from .settings import Settings
 from .stepping import PART
@@ -27,6 +28,7 @@ from .unfolding import unfolded
 _CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "OPENED": 2, "STRIP": 2, "MEAN_VALUE": 1e6, "RINGS": np.inf}
 # A surface bulges if its outline is so short: then neither its projection nor its conformal map is any good.
 _BULGING = 0.45  # of the squared outline, relative to that of a disk of the surface's area
+_FLAT = 0.95  # of a surface's area, that its largest shadow has, if its projection is to be nearly isometric
 _TRACE = 1e-4  # of a surface's area, that flipped triangles may have for it to be as good as valid
 
 
@@ -57,18 +59,29 @@ def _weighted_or_ring_map(domain, initial):
     return ring_map(domain) if initial == "RINGS" else weighted_map(domain, initial)
 
 
+def _largest_shadows(surface):
+    """The area of every piece's largest shadow on a plane, less what lies there face down, (p,): the loops tell it."""
+    start, end = surface.vertices[np.concatenate(surface.loops)], surface.vertices[followers(surface.loops)]
+    piece = np.repeat(surface.loop_piece, [len(loop) for loop in surface.loops])
+    sums = [np.bincount(piece, along, surface.piece_count) for along in np.cross(start, end).T]
+    return np.linalg.norm(sums, axis=0) / 2
+
+
 class _Candidates:
     """The natural maps of a surface's pieces, of which some suit only some of them."""
 
     def __init__(self, surface: Surface, settings: Settings):
         self._surface, self._settings = surface, settings
         self._bulging = surface.outline_lengths**2 < _BULGING * 4 * np.pi
+        self._flat = _largest_shadows(surface) > _FLAT
         self.crossing = np.zeros(surface.piece_count, bool)
         """(p,), the pieces whose conformal maps would be good if they did not cross themselves"""
 
     def suited(self, initial: str, pieces: np.ndarray) -> np.ndarray:
         """For which of the chosen `pieces` (p,) bool a map of that kind is worth trying, (p,) bool."""
-        if initial in ("PROJECTION", "CONFORMAL"):
+        if initial == "PROJECTION":
+            return pieces & self._flat
+        if initial == "CONFORMAL":
             return pieces & ~self._bulging
         if initial == "OPENED":
             return pieces & self.crossing

@@ -2,11 +2,12 @@
 import numpy as np
 import pytest
 
-from qh_unwrap.core import Surface, distortion, unwrap
+from qh_unwrap.core import Settings, Surface, distortion, starts, unwrap
 from qh_unwrap.core.certificate import certified_pieces
 from qh_unwrap.core.flattening import Flattening, conformal
 from qh_unwrap.core.initial import fit, project
 from qh_unwrap.core.pieces import joined
+from qh_unwrap.core.stepping import finished
 from qh_unwrap.core.triangles import signed_areas
 
 from . import shapes
@@ -143,3 +144,17 @@ def comb(size=60, every=4):
 def test_what_must_be_opened_far_does_not_begin_with_that():
     report = unwrap(*comb()).report
     assert report.injective and report.after.symmetric_dirichlet < 1.005
+
+
+def test_only_what_is_all_but_flat_is_projected(monkeypatch):
+    def tried(*mesh):
+        found = []
+        monkeypatch.setattr(starts, "project", lambda surface: found.append(surface) or project(surface))
+        finished(starts.best_start(Surface(*mesh), Settings()))
+        return bool(found)
+
+    vertices, triangles = shapes.random_disk(3)
+    turned = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    assert tried(vertices @ turned.T, triangles)
+    ring, of_ring = shapes.ring(20, 3)
+    assert tried(ring * [1, 1, 0.01], of_ring) and not tried(*shapes.hemisphere(8))
