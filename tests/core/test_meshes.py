@@ -10,6 +10,7 @@ import pytest
 from qh_unwrap.core import Settings, Surface, errors, unwrap
 
 from ..benchmarks.common import load_mesh
+from .shapes import furthest_apart
 
 FOLDER = Path(os.environ.get("QH_MESHES", "."))
 pytestmark = pytest.mark.skipif("QH_MESHES" not in os.environ, reason="QH_MESHES names no folder of meshes")
@@ -52,6 +53,13 @@ def test_the_papers_map_of_the_mannequin(initial):
 def test_without_repair_the_mannequin_flips():
     settings = Settings(boundary="CIRCLE", iterations=10, tolerance=0, repair=False, refine=0)
     assert unwrap(*load_mesh(FOLDER / "disk" / "mannequin-devil.off"), settings).report.after.flips > 0
+
+
+@pytest.mark.parametrize("name", ["lion_o_f10000.obj", "planck_s1.obj", "santa_i_f10000.obj"])
+def test_what_opens_little_is_mirrored_however_far_it_goes(name):
+    vertices, triangles = load_mesh(FOLDER / "charts" / name)
+    one, other = unwrap(vertices, triangles), unwrap(vertices * [-1, 1, 1], triangles[:, ::-1])
+    assert furthest_apart(one.uv, other.uv * [-1, 1]) < 1e-6
 
 
 @pytest.mark.parametrize(
