@@ -24,8 +24,8 @@ _PIECES = 8  # pieces of the circle's radius, of which none of a wall is longer
 _SAMPLES = 5  # points of a wall that the air around keeps its distance from
 _COARSEST = 4  # edges of the coarsest air that reach from the middle to the circle
 _FINEST = 64  # edges of the finest air that reach across the island's radius, at most,
-_COARSER = 2, 4  # times as long as those of the outline, and as those of one with many sides
-_MANY = 150  # sides by which these are divided to tell how many times
+_COARSER = 2, 4  # times as long as those of the outline, at least and at most:
+_SIDES = 150  # once for so many sides of it
 _UNEVEN = 1e-3  # of a grid's step
 _EVEN = 1e-6  # by the cube of the outline: how little longer sides may lie to one side for no axis to be told by them
 
@@ -145,7 +145,7 @@ def _graded_points(start, end, walls, radius):
     length = np.linalg.norm(end - start, axis=1)
     reach = _RADIUS * radius
     coarsest = step = reach / _COARSEST
-    finest = np.clip(np.clip(len(start) / _MANY, *_COARSER) * length.mean(), radius / _FINEST, coarsest)
+    finest = np.clip(np.clip(len(start) / _SIDES, *_COARSER) * length.mean(), radius / _FINEST, coarsest)
     count = np.maximum(1, np.ceil(length / finest)).astype(int)
     side = np.repeat(np.arange(len(start)), count)
     part = (np.arange(len(side)) - np.repeat(np.cumsum(count) - count, count)) / count[side]

@@ -186,7 +186,7 @@ class Barrier:
     def pull(self, jacobian: np.ndarray) -> tuple[np.ndarray, ...]:
         """What pulls every triangle to its shape at rest, turned as in the map: the gradient of half its squared
         distance from that (Liu et al. 2008) by the corners' u and v, and that energy's Hessian, the same in u and v, of
-        the corners c and c + 1: (3, m) each.  Air weighs less here: it gives way more than its triangles can follow.
+        the corners c and c + 1: (3, m) each.  Air weighs less here, so that outlines get farther.
         """
         weight = self._weight.copy()
         for _, part in self._air:

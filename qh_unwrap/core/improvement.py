@@ -196,7 +196,7 @@ class Improvement:
             yield from self.refine(group.of(sound))
 
     def refine(self, group: Group, watched: bool = False, rigidly: bool = False) -> Steps:
-        """Newton's steps, in every piece as long as they pay.
+        """Newton's steps, in every piece as long as they pay; `rigidly` with one before them that lays triangles out.
 
         Pieces that are `watched` stop where their outlines come to cross themselves in the first step, as most that do.
         """
