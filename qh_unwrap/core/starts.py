@@ -25,7 +25,15 @@ from .triangles import corners_of, signed_areas
 from .unfolding import unfolded
 
 # The starts to choose from, the cheapest or best first, and the energy that needs no further one
-_CANDIDATES = {"PROJECTION": 1 + 1e-3, "CONFORMAL": 2, "OPENED": 2, "STRIP": 2, "MEAN_VALUE": 1e6, "RINGS": np.inf}
+_CANDIDATES = {
+    "PROJECTION": 1 + 1e-3,
+    "CONFORMAL": 2,
+    "OPENED": 2,
+    "STRIP": 2,
+    "SHADOW": 2,
+    "MEAN_VALUE": 1e6,
+    "RINGS": np.inf,
+}
 # A surface bulges if its outline is so short: then neither its projection nor its conformal map is any good.
 _BULGING = 0.45  # of the squared outline, relative to that of a disk of the surface's area
 _FLAT = 0.95  # of a surface's area, that its largest shadow has, if its projection is to be nearly isometric
@@ -81,6 +89,8 @@ class _Candidates:
         """For which of the chosen `pieces` (p,) bool a map of that kind is worth trying, (p,) bool."""
         if initial == "PROJECTION":
             return pieces & self._flat
+        if initial == "SHADOW":  # as good as another where these fail
+            return pieces & ~self._flat & ~self._bulging
         if initial == "CONFORMAL":
             return pieces & ~self._bulging
         if initial == "OPENED":
@@ -98,6 +108,8 @@ class _Candidates:
             return self._flattening.map()
         if initial == "OPENED":
             return self._flattening.opened(pieces[self._flat_pieces])[rows[self._flat_rows]]
+        if initial == "SHADOW":
+            return project(part)
         if initial == "STRIP":
             return _within_outlines(part, self._straight[rows], "MEAN_VALUE")
         return natural_start(part, self._settings, initial)

@@ -11,6 +11,7 @@ from qh_unwrap.core.stepping import finished
 from qh_unwrap.core.triangles import signed_areas
 
 from . import shapes
+from .patches import Patches
 
 
 def cone(seed):
@@ -158,3 +159,10 @@ def test_only_what_is_all_but_flat_is_projected(monkeypatch):
     assert tried(vertices @ turned.T, triangles)
     ring, of_ring = shapes.ring(20, 3)
     assert tried(ring * [1, 1, 0.01], of_ring) and not tried(*shapes.hemisphere(8))
+
+
+@pytest.mark.parametrize("seed", [1063, 10511])
+def test_what_is_folded_begins_with_its_shadow_where_nothing_else_is_good(seed):
+    fan = Patches()(seed, largest=1500)[1:]
+    report = unwrap(*fan).report
+    assert report.converged and report.iterations < 10 and report.after.symmetric_dirichlet < 1.05
