@@ -135,7 +135,7 @@ class Improvement:
             fine = going & valid & ~wrong_pieces([island], self.placed(group.island_uv, group.pieces, island))
             value = np.where(fine, energies(island, group.island_uv, settings.balance), np.inf)
             isometric = fine & self.refining & (value <= ISOMETRIC)
-            handover = np.where(value > _FAR, _FAR_HANDOVER, _HANDOVER)
+            handover = np.where((value > _FAR) & ~self.batch.has_hold[group.pieces], _FAR_HANDOVER, _HANDOVER)
             enough = fine & self.refining & (number > 0) & (value > (1 - handover) * least)
             better = fine & (~found | ~uneven | (value < least))
             best = np.where(better[island.vertex_piece, None], group.island_uv, best)
