@@ -16,7 +16,7 @@ from .tensor import area_scale, jacobian, jacobian_of
 from .triangles import by_parts, corners_of, hat_gradients, signed_areas
 
 ISOMETRIC = 1 + 1e-6  # the energy of a map that nothing could better visibly
-AIR = 0.2  # air weighs so many times the geometric mean of the energy and of what it lies above its least value,
+AIR = 0.25  # air weighs so many times the geometric mean of the energy and of what it lies above its least value,
 _THIN = 1e-4  # or this where it lies hardly above that
 _LIGHTER = 0.3  # times as much it weighs where all triangles are laid out at once
 _FOLLOWING = [1, 2, 0]  # corners
