@@ -227,14 +227,16 @@ class Course(Improvement):
                 for k in np.flatnonzero(again):
                     self.changes[k] = []
         far = ~(done | near)
-        for chosen in (far & rigidly, far & ~rigidly):
-            if chosen.any():
-                yield from self._in_air(chosen, start.copy(), rigidly=bool(rigidly[chosen].any()))
+        if far.any():
+            yield from self._in_air(far, start.copy(), rigidly=far & rigidly)
 
-    def _in_air(self, pieces: np.ndarray, start: np.ndarray, following: bool = False, rigidly: bool = False) -> Steps:
+    def _in_air(
+        self, pieces: np.ndarray, start: np.ndarray, following: bool = False, rigidly: np.ndarray | None = None
+    ) -> Steps:
         """Improve the maps of the chosen pieces with air around them, or with their outlines as they are.
 
-        Where pins are elsewhere than in the `start`, it is led after them first, and if `following`, everywhere.
+        Where pins are elsewhere than in the `start`, it is led after them first, and if `following`, everywhere.  What
+        is to begin `rigidly`, (p,) bool, is refined at once, unless it must begin with a circle.
         """
         batch = self.batch
         airs: dict[int, Air] = {}
@@ -254,14 +256,16 @@ class Course(Improvement):
             still = crossed.copy()
             self._make_airs(still, start, airs)
             missing &= ~crossed | still
-        for within in self._portions(pieces & ~missing):
+        rigidly = np.zeros_like(pieces) if rigidly is None else rigidly & ~crossed
+        ready = pieces & ~missing
+        for within in self._portions(ready & rigidly) + self._portions(ready & ~rigidly):
             its = [airs[k] for k in np.flatnonzero(within).tolist()]
             walls = None if batch.walls is None else [batch.walls[k] for k in np.flatnonzero(within).tolist()]
             make = partial(Plane, airs=its, triangulate=self._triangulate, walls=walls)
             group = self._group(within, start, make)
             if following or (apart & within).any():
                 yield from self._led(group)
-            elif rigidly:
+            elif rigidly[within].all():
                 yield from self.refine(group, rigidly=True)
             else:
                 yield from self.improve(group)

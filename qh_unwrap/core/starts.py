@@ -108,11 +108,9 @@ class _Candidates:
             return self._flattening.map()
         if initial == "OPENED":
             return self._flattening.opened(pieces[self._flat_pieces])[rows[self._flat_rows]]
-        if initial == "SHADOW":
-            return project(part)
         if initial == "STRIP":
             return _within_outlines(part, self._straight[rows], "MEAN_VALUE")
-        return natural_start(part, self._settings, initial)
+        return natural_start(part, self._settings, "PROJECTION" if initial == "SHADOW" else initial)
 
 
 def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tuple[np.ndarray, np.ndarray, np.ndarray]]:
