@@ -10,9 +10,10 @@ from ..core import Surface, distortion
 from ..core.certificate import are_injective, as_stored, orientation
 from ..core.contacts import touches_along_seams_only
 from ..core.delaunay import triangulate
-from ..core.pieces import joined, numbers, starts_of
+from ..core.pieces import joined, numbers, parts_of, starts_of
 from ..core.triangles import areas_in_space
 from ..core.unfolding import unfolded, unfolded_in_air
+from .work import written_uv
 
 _SAME = 1e-6  # of an island's extent, by which the two sides of a seam may be apart and yet be meant to be one line
 _ROUNDED = 1e-2  # of an island's area, that triangles flipped by rounding may have
@@ -46,8 +47,7 @@ class _Seen(NamedTuple):
 
 def _stored_uvs(works):
     """The works' new UVs, (n, 2) each, in Blender's single precision, as seen from where they are not mirrored."""
-    uvs = [work.written_uv for work in works]
-    stored = np.split(as_stored(np.concatenate(uvs)), starts_of(uvs)[1:])
+    stored = parts_of(as_stored(written_uv(works)), starts_of([work.uv for work in works]))
     return [uv * (-1, 1) if work.mirrored else uv for work, uv in zip(works, stored, strict=True)]
 
 
@@ -60,7 +60,7 @@ def _seen(works):
     solid = sign != 0  # those without area do not count, unless they should have some
     piece = numbers(triangle_starts, len(triangles))
     certified = are_injective(uv, triangles[solid], piece[solid], loops, loop_piece)
-    return [_Seen(*each) for each in zip(uvs, np.split(sign, triangle_starts[1:]), certified.tolist(), strict=True)]
+    return [_Seen(*each) for each in zip(uvs, parts_of(sign, triangle_starts), certified.tolist(), strict=True)]
 
 
 def judge(works):
@@ -73,15 +73,20 @@ def judge(works):
     if mended:
         for k, each in zip(mended, _seen([works[k] for k in mended]), strict=True):
             seen[k] = each
-    for work, (uv, sign, is_injective) in zip(works, seen, strict=True):
+    signs = [each.sign for each in seen]
+    starts = starts_of(signs)
+    reported = np.concatenate([work.outcome.after.triangle_orientation for work in works])
+    differ = np.logical_or.reduceat(np.concatenate(signs) != reported, starts).tolist()
+    flipped = np.logical_or.reduceat(np.concatenate(signs) < 0, starts).tolist()
+    for k, (work, (uv, sign, is_injective)) in enumerate(zip(works, seen, strict=True)):
         outcome = work.outcome
-        if work.is_redrawn or not np.array_equal(sign, outcome.after.triangle_orientation):
+        if work.island.is_redrawn or differ[k]:
             outcome.after = distortion(work.vertices, work.triangles, uv * work.aspect)
-        if work.is_redrawn:
+        if work.island.is_redrawn:
             _judge_drawn(work, sign)
         if work.island.doubled_faces:
             _judge_doubled(work, orientation(uv, work.doubled))
-        outcome.injective = not (outcome.after.flips or outcome.after.collapsed or (sign < 0).any())
+        outcome.injective = not (outcome.after.flips or outcome.after.collapsed or flipped[k])
         if outcome.injective and not is_injective:
             outcome.injective = touches_along_seams_only(uv, work.loops, work.place)
             if outcome.injective:

@@ -8,31 +8,32 @@ import numpy as np
 from ..core import UnwrapError, placing
 from ..core.triangles import areas_in_space
 from . import packing, texels
+from .work import maps, old_triangles, put_maps, surfaces
 
 _SLACK = 1e-5  # of the square, by which islands may reach over its border
 
 
 def place(works, all_works, options, context):
     works = [work for work in works if not work.in_frame]
+    old, new = ([work for work in works if work.has_place is has_place] for has_place in (True, False))
     for work in works:
-        old = work.old_triangles
-        work.mirrored = old is not None and placing.is_mirrored(old)
+        work.mirrored = work.has_place and work.was_mirrored
         if work.mirrored:
             work.uv = work.uv * (-1, 1)
         if options.placement == 'UNIT':
             work.uv = placing.in_unit_square(work.uv / work.aspect) * work.aspect
-        elif old is not None:
-            work.uv = placing.in_place(work.uv, work.triangles, old)
+    if old and options.placement != 'UNIT':
+        islands = surfaces(old)
+        put_maps(old, islands.of_each(placing.in_place(islands, maps(old), old_triangles(old))))
     texels.choose_scales(works, options, context)
     if options.placement != 'PACK':
-        resize([work for work in works if options.placement == 'UNIT' or work.old_triangles is not None])
+        resize(works if options.placement == 'UNIT' else old)
     if options.placement == 'UNIT':
         return
-    new = [work for work in works if work.old_triangles is None]
     if new:
-        turned = placing.upright([(work.uv, work.vertices, work.triangles, work.mesh.up) for work in new])
-        for work, uv in zip(new, turned, strict=True):
-            work.uv = uv
+        islands = surfaces(new)
+        turned = placing.upright(islands, maps(new), np.array([work.mesh.up for work in new]))
+        put_maps(new, islands.of_each(turned))
     if options.placement == 'PACK':
         _pack(works, options, True, context)
         _make_way(works, all_works)
@@ -44,9 +45,12 @@ def place(works, all_works, options, context):
 def resize(works):
     """Give islands the scale that is chosen for them, around their middles."""
     works = [work for work in works if work.scale is not None]
-    for work, factor in zip(works, texels.factors(works), strict=True):
-        middle = placing.centre(work.uv[work.triangles])
-        work.uv = middle + (work.uv - middle) * factor
+    if not works:
+        return
+    islands, uv = surfaces(works), maps(works)
+    middle = placing.centres(islands, uv)[islands.piece]
+    resized = middle + (uv - middle) * texels.factors(works)[islands.piece, None]
+    put_maps(works, islands.of_each(resized))
 
 
 def pack_apart(works, options, context):
@@ -87,33 +91,26 @@ def _pack(works, options, nested, context):
     if not works:
         return
     works = sorted(works, key=lambda work: work.aspect[0])
-    islands = [(work.uv, work.vertices, work.triangles) for work in works]
-    uvs, enlarged = placing.to_scale(islands, _importance(works))
+    islands = surfaces(works)
+    uv, enlarged = placing.to_scale(islands, maps(works), _importance(works))
     scaled = works[0].scale is not None  # as then all of them are
     if scaled:
-        for work, uv in zip(works, uvs, strict=True):
-            work.uv = uv
+        put_maps(works, islands.of_each(uv))
         factors = texels.factors(works)
-        factors /= np.sqrt(((factors * [np.ptp(uv, axis=0).max() for uv in uvs]) ** 2).sum())
-        uvs = [uv * factor for uv, factor in zip(uvs, factors, strict=True)]
+        factors /= np.sqrt(((factors * np.ptp(islands.boxes(uv), axis=0).max(axis=1)) ** 2).sum())
+        uv = uv * factors[islands.piece, None]
         enlarged = np.zeros(len(works), dtype=bool)
-    islands = zip(works, uvs, strict=True)
-    groups = {
-        aspect: [(uv, work.triangles) for work, uv in group]
-        for aspect, group in itertools.groupby(islands, key=lambda island: island[0].aspect[0])
-    }
     try:
-        packed = packing.pack(groups, options, nested, context)
+        packed = packing.pack(islands, uv, [work.aspect[0] for work in works], options, nested, context)
     except UnwrapError as error:
-        packed = [None] * len(works)
         for work in works:
-            work.outcome.error = str(error)
-    for work, uv, is_enlarged in zip(works, packed, enlarged.tolist(), strict=True):
-        work.uv = uv
-        if is_enlarged and uv is not None:
-            work.outcome.warnings += ("beside the others it would vanish: packed larger than its share",)
+            work.uv, work.outcome.error = None, str(error)
+        return
+    put_maps(works, islands.of_each(packed))
+    for k in np.flatnonzero(enlarged).tolist():
+        works[k].outcome.warnings += ("beside the others it would vanish: packed larger than its share",)
     if scaled:
-        _resize_together([work for work in works if work.uv is not None])
+        _resize_together(works)
 
 
 def _importance(works):
@@ -132,8 +129,6 @@ def _importance(works):
 
 def _resize_together(works):
     """Give packed islands the scales that are chosen for them, all by the same factor around the origin."""
-    if not works:
-        return
     factor = float(np.median(texels.factors(works)))
     for work in works:
         work.uv = work.uv * factor
@@ -148,7 +143,7 @@ def _others(works, all_works):
     for work in all_works:
         if id(work) not in mine and work.uv is not None:
             yield work.uv / work.aspect
-        elif id(work) not in mine and work.old_triangles is not None:
+        elif id(work) not in mine and work.has_place:
             yield work.old_uv / work.aspect
     yield from (rest.reshape(-1, 2) for _, rest, _ in left_alone(all_works))
 

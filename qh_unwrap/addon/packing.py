@@ -4,46 +4,53 @@
 import bpy
 import numpy as np
 
-from ..core import UnwrapError, placing
-from ..core.pieces import joined, starts_of
+from ..core import UnwrapError
+from . import bulk
 
 _NAME = "QH Unwrap"
 
 
-def pack(groups, options, nested, context):
-    """Lay islands out in the 0 to 1 square; returns their new UVs, one after another.
+def pack(islands, uv, aspects, options, nested, context):
+    """Lay islands, `Pieces`, out in the 0 to 1 square; returns their new UVs (n, 2).
 
-    groups  {aspect: [(uv, triangles), ...]}, by the aspect of the image; UVs have its proportions and the same scale
+    uv       (n, 2), in the proportions of their images and at the same scale
+    aspects  (k,), those of the islands' images, ascending
 
     If `nested`, they fit into one another, which may take Blender a minute, and are turned by right angles if the
     options say so; else their boxes lie side by side.  Blender packs what is selected in Edit Mode, so this happens in
     a scene of its own, where no one's selection is disturbed.  Raises `UnwrapError` if Blender does not.
     """
-    return (_pack if nested else _pack_boxes)(groups, options, nested, context)
-
-
-def _pack_boxes(groups, options, nested, context):
-    """The same for their boxes, which lie side by side: of each island Blender gets a rectangle."""
-    uvs = [uv for group in groups.values() for uv, _ in group]
-    low, high = placing.boxes(uvs)
+    if nested:
+        aspect = np.array(aspects)
+        return _packed(uv, islands.triangles, aspect[islands.triangle_piece], options, nested, context)
+    # Of each island Blender gets a rectangle.
+    low, high = islands.boxes(uv)
     high = np.maximum(high, low + 1e-6 * (high - low).max())
     corners = np.stack([low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])])
-    halves = np.array([[0, 1, 2], [0, 2, 3]])
-    rectangles = iter(corners.swapaxes(0, 1))
-    boxes = {aspect: [(next(rectangles), halves) for _ in group] for aspect, group in groups.items()}
-    packed = np.array(_pack(boxes, options, nested, context))
+    halves = 4 * np.arange(len(low))[:, None, None] + [[0, 1, 2], [0, 2, 3]]
+    boxes = corners.swapaxes(0, 1).reshape(-1, 2), halves.reshape(-1, 3), np.repeat(aspects, 2)
+    packed = _packed(*boxes, options, nested, context).reshape(-1, 4, 2)
     scale = np.ptp(packed, axis=1).max(axis=1) / (high - low).max(axis=1)
-    return [(uv - old) * size + new for uv, old, size, new in zip(uvs, low, scale, packed[:, 0], strict=True)]
+    low, scale, new = (each[islands.piece] for each in (low, scale[:, None], packed[:, 0]))
+    return (uv - low) * scale + new
 
 
-def _pack(groups, options, nested, context):
+def _packed(uv, triangles, aspect, options, nested, context):
+    """The UVs (n, 2) after the triangles (t, 3) are packed as they hang together, for images of their aspects (t,)."""
     scene = bpy.data.scenes.new(_NAME)
     made = [scene]
     try:
-        meshes = [_mesh(aspect, islands, made) for aspect, islands in groups.items()]
+        parts = [(each, triangles[aspect == each]) for each in np.unique(aspect).tolist()]
+        # Islands come in the order of their aspects: each part has its own vertices, in a row.
+        rows = [slice(its.min(), its.max() + 1) for _, its in parts]
+        meshes = [_mesh(each, uv[its], own - its.start, made) for its, (each, own) in zip(rows, parts, strict=True)]
         if not _done(scene, meshes, options, nested, context):
             raise UnwrapError("Blender could not pack the islands: choose the placement Unit Square")
-        return [uv for mesh, group in zip(meshes, groups.items(), strict=True) for uv in _uvs(mesh, *group)]
+        packed = uv.copy()
+        for mesh, its, (each, _) in zip(meshes, rows, parts, strict=True):
+            corners = bulk.values(mesh.uv_layers[0].uv, "vector", np.float32, 2)
+            packed[its.start + bulk.corner_vertices(mesh)] = corners.astype(float) * (each, 1)
+        return packed
     finally:
         bpy.data.batch_remove(made)
 
@@ -89,9 +96,8 @@ def forget_escape():
     bpy.ops.ptcache.bake_all(bake=False)
 
 
-def _mesh(aspect, islands, made):
-    """One mesh of all the islands' triangles, with an image of that aspect."""
-    uv, triangles, _, _ = joined(*zip(*islands, strict=True))
+def _mesh(aspect, uv, triangles, made):
+    """A mesh of the triangles (t, 3), with an image of that aspect."""
     uv = uv / (aspect, 1)
     mesh = bpy.data.meshes.new(_NAME)
     made.append(mesh)
@@ -118,13 +124,3 @@ def _material(aspect, made):
         material.use_nodes = True
     material.node_tree.nodes.new("ShaderNodeTexImage").image = image
     return material
-
-
-def _uvs(mesh, aspect, islands):
-    vertex = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", vertex)
-    corners = np.empty(2 * len(mesh.loops), dtype=np.float32)
-    mesh.uv_layers[0].uv.foreach_get("vector", corners)
-    uv = np.empty((len(mesh.vertices), 2))
-    uv[vertex] = corners.reshape(-1, 2) * (aspect, 1)
-    return np.split(uv, starts_of([uv for uv, _ in islands])[1:])

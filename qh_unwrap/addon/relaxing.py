@@ -12,6 +12,7 @@ from ..core.relaxing import relax_islands, rim, straighten_islands
 from ..core.stepping import mapped
 from ..core.straightening import Polygons, rectangle, straight_lines
 from . import judging, layout, mesh_arrays, modes, stacking, texels
+from .old_maps import OldMaps
 from .outcome import Outcome
 from .selection import Target
 from .unwrapping import are_as_read, keep, tell_of_density, write
@@ -109,9 +110,10 @@ def _works(obj, mesh, connected, faces, moving):
     """A work for each island that the faces make, of which the corners that are `moving`, (c,) bool, may move."""
     islands = connected.islands(faces, mesh.corner_triangles)
     target = Target(obj, faces)
-    for number, island in enumerate(islands, start=1):
-        outcome = Outcome(obj.name, number, island.faces, alone=len(islands) == 1)
-        work = Work(target, mesh, island, outcome, Settings(boundary='KEEP'), np.zeros(len(moving), dtype=bool))
+    old_maps, nowhere = OldMaps(mesh, islands), np.zeros(len(moving), dtype=bool)
+    for number, island in enumerate(islands):
+        outcome = Outcome(obj.name, number + 1, island.faces, alone=len(islands) == 1)
+        work = Work(target, mesh, island, outcome, Settings(boundary='KEEP'), nowhere, old_maps, number)
         work.connected = connected
         work.moving = np.zeros(len(island.vertices), dtype=bool)
         work.moving[island.corner_vertex[moving[island.corners]]] = True
@@ -121,7 +123,7 @@ def _works(obj, mesh, connected, faces, moving):
 def _refused(obj, mesh, faces, error):
     """An outcome for all of the faces, with the error; as a work, of which there is no island."""
     outcome = Outcome(obj.name, 1, np.flatnonzero(faces), error=error)
-    return Work(Target(obj, faces), mesh, None, outcome, Settings(), None)
+    return Work(Target(obj, faces), mesh, None, outcome, Settings(), None, None, 0)
 
 
 def _carried_out(chosen, parted, improved, settings, options, context):

@@ -3,6 +3,7 @@
 
 from ..core.overlaps import new_overlaps
 from . import layout
+from .work import triangles_in_map
 
 _NAMED = 5  # of those that an island lies on
 
@@ -12,12 +13,13 @@ def report_overlaps(works, all_works, options):
 
     A generator that yields the share that is done, from 0 to 1.  What shares no image does not overlap.
     """
-    names = [work.outcome.label for work in works]
-    names += [f"other faces of {obj.name}" for obj, _, _ in layout.left_alone(all_works)]
+    rest = [f"other faces of {obj.name}" for obj, _, _ in layout.left_alone(all_works)]
     found = yield from new_overlaps_of(works, all_works)
     for work, others in zip(works, found, strict=False):
         outcome = work.outcome
-        outcome.overlaps = tuple(names[other] for other in others[:_NAMED])
+        outcome.overlaps = tuple(
+            works[other].outcome.label if other < len(works) else rest[other - len(works)] for other in others[:_NAMED]
+        )
         outcome.more_overlaps = len(others[_NAMED:])
         # Packing moves only what is unwrapped, and does not help again.
         packing_helps = options.placement != 'PACK' and others and others[0] < len(works)
@@ -30,9 +32,8 @@ def new_overlaps_of(works, all_works):
     others = list(layout.left_alone(all_works))
     if len(works) + len(others) < 2:
         return [[] for _ in works]
-    now = [(work.uv / work.aspect)[work.triangles] for work in works]
-    before = [work.old_triangles for work in works]
-    before = [old if old is None else old / work.aspect for old, work in zip(before, works, strict=True)]
+    now = triangles_in_map(works)
+    before = [work.old_triangles / work.aspect if work.has_place else None for work in works]
     images = [work.image for work in works]
     for _, rest, image in others:
         now.append(rest)

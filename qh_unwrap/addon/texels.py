@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..core import placing
+from .work import maps, surfaces
 
 
 def unit(scene):
@@ -21,7 +21,7 @@ def note(works, context):
     """Put into the outcomes of works that have UVs how large they are and what their texel density is."""
     if not works:
         return
-    areas, in_map = _areas(works, [work.uv for work in works])
+    areas, in_map = _areas(works, maps(works))
     metres = unit(context.scene)
     for work, area, its in zip(works, areas.tolist(), in_map.tolist(), strict=True):
         picture = work.picture
@@ -39,10 +39,10 @@ def choose_scales(works, options, context):
         for work in works:
             work.scale = options.pixels_per_metre * unit(context.scene) / _side(work, options)
     elif options.texel_density == 'KEEP':
-        old = [work for work in works if work.old_triangles is not None]
+        old = [work for work in works if work.has_place]
         if not old:
             return
-        areas, in_map = _areas(old, [work.old_uv for work in old])
+        areas, in_map = _areas(old, np.concatenate([work.old_uv for work in old]))
         mean = np.sqrt(in_map.sum() / areas.sum())
         for work in works:
             work.scale = mean
@@ -60,11 +60,11 @@ def factors(works):
     """What to multiply each work's map with, (k,), so that it gets the scale that is chosen for it."""
     if not works:
         return np.zeros(0)
-    areas, in_map = _areas(works, [work.uv for work in works])
+    areas, in_map = _areas(works, maps(works))
     return np.array([work.scale for work in works]) * np.sqrt(areas / np.where(in_map > 0, in_map, 1))
 
 
-def _areas(works, uvs):
-    """The areas of the works, (k,), in space and in the maps `uvs`."""
-    in_space = placing.areas([(work.vertices, work.triangles) for work in works])
-    return in_space, placing.uv_areas([(uv, work.triangles) for work, uv in zip(works, uvs, strict=True)])
+def _areas(works, uv):
+    """The areas of the works, (k,), in space and in the maps `uv` (n, 2), which are one after another."""
+    islands = surfaces(works)
+    return islands.areas, islands.areas_in(uv)

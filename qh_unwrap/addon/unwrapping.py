@@ -16,10 +16,11 @@ from ..core.stepping import mapped
 from ..core.unwrapping import unwrap_variously
 from . import judging, layout, mesh_arrays, modes, stacking, texels
 from .hints import hint_at_seams
+from .old_maps import OldMaps
 from .options import MeshOptions
 from .outcome import Outcome, count
 from .selection import Target
-from .work import Work
+from .work import Work, corners_to_write
 
 
 def unwrap_targets(
@@ -99,9 +100,10 @@ def _works(target, mesh, settings):
     if stays_attached and mesh.uv is not None:
         hanging = attached(*topology, mesh.uv)
     islands = find_islands(*topology, mesh.corner_triangles)
-    for number, island in enumerate(islands, start=1):
-        outcome = Outcome(obj.name, number, island.faces, alone=len(islands) == 1)
-        yield Work(target, mesh, island, outcome, settings, hanging)
+    old_maps = OldMaps(mesh, islands)
+    for number, island in enumerate(islands):
+        outcome = Outcome(obj.name, number + 1, island.faces, alone=len(islands) == 1)
+        yield Work(target, mesh, island, outcome, settings, hanging, old_maps, number)
 
 
 def _take(cut, work):
@@ -140,17 +142,18 @@ def _unwrap(works):
 def _shape(work):
     """The settings and the shape that the core gets for an island."""
     settings, uv, pinned = work.settings, work.old_uv, work.pinned
-    if work.found_uv is not None and settings.boundary == 'FREE' and settings.initial == 'AUTO' and not pinned.any():
+    has_pins = bool(pinned.any())
+    if work.found_uv is not None and settings.boundary == 'FREE' and settings.initial == 'AUTO' and not has_pins:
         # A start that is valid: another one may not lead to a map that is.
         settings = dataclasses.replace(settings, initial='CURRENT', iterations=0)
         return settings, _made_shape(work, work.found_uv)
     if work.is_attached:
         if settings.boundary == 'FREE':
-            pinned = pinned | work.attached_vertices
+            pinned, has_pins = pinned | work.attached_vertices, True
         elif settings.boundary != 'KEEP':
             settings = dataclasses.replace(settings, boundary='KEEP')
             work.outcome.warnings += ("its outline is kept, since faces that are not selected hang on it",)
-    work.in_frame = settings.boundary == 'KEEP' or (settings.boundary == 'FREE' and bool(pinned.any()))
+    work.in_frame = settings.boundary == 'KEEP' or (settings.boundary == 'FREE' and has_pins)
     uses_uv = work.in_frame or settings.initial == 'CURRENT'
     if work.uv_fault and uses_uv:
         raise UVError(f"{work.uv_fault}: {_without_uvs(settings)}")
@@ -161,8 +164,7 @@ def _shape(work):
             text = f"its UVs are cut where there is no seam: {_uncut(work.mesh)}"
             raise UVError(text + (_HANGS if work.is_attached else ""))
         uv = None
-    pinned = pinned if pinned.any() else None
-    return settings, _made_shape(work, uv, pinned)
+    return settings, _made_shape(work, uv, pinned if has_pins else None)
 
 
 def _made_shape(work, uv, pinned=None):
@@ -223,10 +225,8 @@ def _remarks(island):
 
 def write(obj, works, cut=None):
     """Write the works' UVs into their object, and mark the new seams of a cut; call it in Object Mode."""
-    corners = np.concatenate([work.island.corners[work.written] for work in works])
-    uv = np.concatenate([work.corner_uv[work.written] for work in works])
     try:
-        mesh_arrays.write(obj, corners, uv)
+        mesh_arrays.write(obj, *corners_to_write(works))
     except UnwrapError as error:
         for work in works:
             work.outcome.error = str(error)
@@ -264,5 +264,4 @@ def pack_apart(targets: Sequence[Target], options: MeshOptions, context: bpy.typ
             raise UnwrapError(work.outcome.error)
     with modes.in_object_mode(context):
         for obj, group in itertools.groupby(works, key=lambda work: work.target.obj):
-            corners, uvs = zip(*((work.island.corners, work.corner_uv) for work in group), strict=True)
-            mesh_arrays.write(obj, np.concatenate(corners), np.concatenate(uvs))
+            mesh_arrays.write(obj, *corners_to_write(list(group)))

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of an island while it is unwrapped."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from ..core import Settings, placing
+from ..core import Settings
 from ..core.islands import Island
+from ..core.pieces import Pieces, joined, parts_of, starts_of
 from ..core.regions import Connected
 from ..core.straightening import Straight
 from ..core.triangles import corners_of, signed_areas
 from . import mesh_arrays
+from .old_maps import OldMaps
 from .outcome import Outcome
 from .selection import Target
 
@@ -26,6 +29,8 @@ class Work:
     outcome: Outcome
     settings: Settings
     attached: np.ndarray  # (c,) bool, the mesh's corners that hang on faces that are not unwrapped
+    old_maps: OldMaps  # of its mesh's islands,
+    number: int  # and which of these it is
     uv: np.ndarray | None = None  # (n, 2) the new ones
     loops: list | None = None  # its boundary
     mirrored: bool = False
@@ -39,13 +44,10 @@ class Work:
     straight: Straight | None = None  # what is to be straight in it
     connected: Connected | None = None  # how its mesh hangs together in the UV map
 
-    @cached_property
+    @property
     def aspect(self):
         """(2,) what to multiply UVs with: of the image that most faces show."""
-        if self.mesh.one_aspect is not None:
-            return np.array([self.mesh.one_aspect, 1.0])
-        values, counts = np.unique(self.mesh.aspect[self.island.faces], return_counts=True)
-        return np.array([values[np.argmax(counts)], 1.0])
+        return self.old_maps.aspects[self.number]
 
     @cached_property
     def image(self):
@@ -57,7 +59,7 @@ class Work:
         """The `Picture` that most of its faces show, None for none."""
         return self.mesh.pictures[self.mesh.slot_of(self.island.faces)]
 
-    @cached_property
+    @property
     def old_uv(self):
         """(n, 2), None if there is no map or nothing in it; where the map is cut, of one of the corners."""
         return None if self.mesh.uv is None or self.uv_fault else self.raw_uv
@@ -65,36 +67,12 @@ class Work:
     @property
     def raw_uv(self):
         """The same where there is a map, whatever is in it."""
-        return self.mesh.uv[self._source] * self.aspect
+        return self.old_maps.uvs[self.number]
 
-    @cached_property
+    @property
     def uv_fault(self):
         """Why the map has no UVs for it though there is a map, or an empty text."""
-        if self.mesh.uv is None:
-            return ""
-        corner_uv = self.mesh.uv[self._corners]
-        if not np.isfinite(corner_uv).all():
-            return "some of its UVs are no numbers"
-        return "" if np.ptp(corner_uv, axis=0).any() else "all its UVs are in one place"
-
-    @property
-    def _corners(self):
-        """(k,) the mesh's corners whose old UVs count: all but those of doubled faces."""
-        return self.island.corners[: self.island.own_corners]
-
-    @property
-    def _corner_vertex(self):
-        """(k,) the island vertex of each of these."""
-        return self.island.corner_vertex[: self.island.own_corners]
-
-    @cached_property
-    def _source(self):
-        """(n,) the mesh's corner that each vertex has its old UVs from, a pinned one if there is one."""
-        source = np.empty(len(self.island.vertices), dtype=np.intp)
-        source[self._corner_vertex] = self._corners
-        pinned = self.mesh.pinned[self._corners]
-        source[self._corner_vertex[pinned]] = self._corners[pinned]
-        return source
+        return "" if self.mesh.uv is None else self.old_maps.faults[self.number]
 
     @property
     def can_stay(self):
@@ -108,13 +86,22 @@ class Work:
         mirrored = signed_areas(corners_of(self.old_uv, self.triangles)).sum() < 0
         return replace(self, uv=self.old_uv, mirrored=bool(mirrored))
 
-    @cached_property
-    def old_triangles(self):
-        """The triangles' old UVs (t, 3, 2), None if they do not say where the island belongs."""
+    @property
+    def has_place(self):
+        """Whether its old UVs say where it belongs."""
         if self.old_uv is None or self.is_fresh or self.has_new_seams:
-            return None
-        old = self.mesh.uv[self.island.triangle_corners] * self.aspect
-        return old if placing.says_where(old) else None
+            return False
+        return self.old_maps.say_where[self.number]
+
+    @property
+    def old_triangles(self):
+        """The triangles' old UVs (t, 3, 2)."""
+        return self.old_maps.triangles[self.number]
+
+    @property
+    def was_mirrored(self):
+        """Whether most of the area of its old UVs is mirrored."""
+        return self.old_maps.are_mirrored[self.number]
 
     @cached_property
     def vertices(self):
@@ -149,28 +136,14 @@ class Work:
         return self.mesh.corner_faces[self.island.triangle_corners[:, 0]]
 
     @property
-    def written_uv(self):
-        """(n, 2) the new UVs as they are written; one that stayed stays to the last bit."""
-        uv = self.uv / self.aspect
-        if self.in_frame:
-            stayed = (self.uv == self.old_uv).all(axis=1)
-            uv[stayed] = self.mesh.uv[self._source[stayed]]
-        return uv
-
-    @property
-    def corner_uv(self):
-        """(c, 2) the new UVs of its corners, the same for all of a vertex; but where it is relaxed, a coordinate that
-        stayed stays in every corner."""
-        new = self.written_uv[self.island.corner_vertex]
-        if self.moving is None or not self.in_frame:
-            return new
-        return np.where((self.uv == self.old_uv)[self.island.corner_vertex], self.mesh.uv[self.island.corners], new)
+    def stayed(self):
+        """(n,) bool, the vertices whose UVs are the old ones, and the UVs (k, 2) of these, to the last bit."""
+        stayed = (self.uv == self.old_uv).all(axis=1)
+        return stayed, self.mesh.uv[self.old_maps.sources[self.number][stayed]]
 
     @property
     def written(self):
-        """(c,) bool, those of its corners whose UVs are written: of vertices that may move."""
-        if self.moving is None:
-            return np.ones(len(self.island.corners), dtype=bool)
+        """(c,) bool, those of its corners whose UVs are written where it is relaxed: of vertices that may move."""
         moved = self.moving.copy()
         if self.straight is not None:
             moved |= self.straight.held.any(axis=1)
@@ -179,19 +152,17 @@ class Work:
     @property
     def is_cut(self):
         """Whether the old UVs have cuts where there is no seam."""
-        old, corner_uv = self.old_uv, self.mesh.uv[self._corners] * self.aspect
-        tolerance = 1e-5 * np.ptp(old, axis=0).max() + 4 * np.finfo(np.float32).eps * np.abs(old).max()
-        return np.abs(old[self._corner_vertex] - corner_uv).max() > tolerance
+        return self.old_maps.are_cut[self.number]
 
-    @cached_property
+    @property
     def is_fresh(self):
         """Whether its old UVs are those of a new map, which say nothing; pinned ones always do."""
-        return bool(self.mesh.fresh[self.island.faces].all()) and not self.pinned.any()
+        return self.old_maps.are_fresh[self.number]
 
     @property
     def drawn(self):
         """(t, 3) the triangles that Blender draws."""
-        return self._drawn if self.is_redrawn else self.island.triangles
+        return self._drawn if self.island.is_redrawn else self.island.triangles
 
     @cached_property
     def _drawn(self):
@@ -208,11 +179,6 @@ class Work:
         vertex[self.island.corners] = self.island.corner_vertex
         return vertex[corners]
 
-    @cached_property
-    def is_redrawn(self):
-        """Whether Blender cuts some of its faces into other triangles than the core gets."""
-        return not np.array_equal(self.island.triangle_corners, self.island.drawn_corners)
-
     @property
     def held(self):
         """(n, 2) bool, which of its new UVs have to stay where they are."""
@@ -226,7 +192,7 @@ class Work:
     @property
     def is_attached(self):
         """Whether its old UVs hang together with those of faces that are not unwrapped."""
-        return self.old_triangles is not None and bool(self.attached[self.island.corners].any())
+        return self.has_place and bool(self.attached[self.island.corners].any())
 
     @property
     def pinned(self):
@@ -244,3 +210,64 @@ class Work:
         if its.any():
             chosen[self.island.corner_vertex[its]] = True
         return chosen
+
+
+def surfaces(works: Sequence[Work]) -> Pieces:
+    """The works' surfaces as one."""
+    return Pieces([work.vertices for work in works], [work.triangles for work in works])
+
+
+def maps(works: Sequence[Work]) -> np.ndarray:
+    """The works' new UVs (n, 2), one after another."""
+    return np.concatenate([work.uv for work in works])
+
+
+def old_triangles(works: Sequence[Work]) -> np.ndarray:
+    """The old UVs (t, 3, 2) of the works' triangles, one after another."""
+    return np.concatenate([work.old_triangles for work in works])
+
+
+def triangles_in_map(works: Sequence[Work]) -> list[np.ndarray]:
+    """The new UVs (t, 3, 2) of each work's triangles, as they are stored."""
+    uv, triangles, starts, triangle_starts = joined([work.uv for work in works], [work.triangles for work in works])
+    uv = uv / np.repeat([work.aspect for work in works], np.diff(starts, append=len(uv)), axis=0)
+    return parts_of(uv[triangles], triangle_starts)
+
+
+def put_maps(works: Sequence[Work], uvs: Sequence[np.ndarray]) -> None:
+    """Give the works their new UVs, (n, 2) each."""
+    for work, uv in zip(works, uvs, strict=True):
+        work.uv = uv
+
+
+def written_uv(works: Sequence[Work]) -> np.ndarray:
+    """The works' new UVs (n, 2), one after another, as they are written; one that stayed stays to the last bit."""
+    starts = starts_of([work.uv for work in works])
+    uv = maps(works)
+    uv = uv / np.repeat([work.aspect for work in works], np.diff(starts, append=len(uv)), axis=0)
+    for work, start in zip(works, starts.tolist(), strict=True):
+        if work.in_frame:
+            stayed, old = work.stayed
+            uv[start + np.flatnonzero(stayed)] = old
+    return uv
+
+
+def corners_to_write(works: Sequence[Work]) -> tuple[np.ndarray, np.ndarray]:
+    """The corners (c,) of the works' mesh whose UVs are written, and these, (c, 2): the same for all corners of a
+    vertex; but where a work is relaxed, a coordinate that stayed stays in every corner."""
+    corners = np.concatenate([work.island.corners for work in works])
+    counts = [len(work.island.corners) for work in works]
+    starts = starts_of([work.uv for work in works])
+    vertex = np.concatenate([work.island.corner_vertex for work in works]) + np.repeat(starts, counts)
+    uv = written_uv(works)[vertex]
+    if all(work.moving is None for work in works):
+        return corners, uv
+    chosen = np.ones(len(corners), bool)
+    for work, end, count in zip(works, np.cumsum(counts).tolist(), counts, strict=True):
+        its = slice(end - count, end)
+        if work.moving is not None:
+            chosen[its] = work.written
+            if work.in_frame:
+                stays = (work.uv == work.old_uv)[work.island.corner_vertex]
+                uv[its] = np.where(stays, work.mesh.uv[work.island.corners], uv[its])
+    return corners[chosen], uv[chosen]

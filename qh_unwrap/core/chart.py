@@ -11,6 +11,7 @@ import numpy as np
 from . import errors
 from .loops import sorted_loops
 from .ordering import Dissection, is_large, local_order
+from .pieces import parts_of, starts_of
 from .topology import HalfEdges, Topology, checked_arrays, edge_keys
 from .triangles import areas_in_space, corner_angles, corners_of, hat_gradients, laid_flat, signed_areas
 
@@ -227,10 +228,13 @@ class Surface(Chart):
         return np.add.reduceat(length, start[:-1])
 
     @cached_property
-    def loops_of(self) -> list[list[np.ndarray]]:
-        """The loops of every piece, its outline first."""
+    def own_loops(self) -> list[list[np.ndarray]]:
+        """The loops of every piece, its outline first, in the piece's own vertices."""
+        own = np.concatenate(self.loops) - np.repeat(
+            self.vertex_starts[self.loop_piece], [len(loop) for loop in self.loops]
+        )
         result: list[list[np.ndarray]] = [[] for _ in range(self.piece_count)]
-        for loop, piece in zip(self.loops, self.loop_piece.tolist(), strict=True):
+        for loop, piece in zip(parts_of(own, starts_of(self.loops)), self.loop_piece.tolist(), strict=True):
             result[piece].append(loop)
         return result
 
@@ -327,7 +331,7 @@ class Surface(Chart):
         made.vertex_piece = np.zeros(end - first, np.int64)
         made.vertex_starts = made.triangle_starts = np.zeros(1, np.int64)
         made.on_boundary = self.on_boundary.reshape(3, -1)[:, its].ravel()
-        made.loops = [loop - first for loop in self.loops_of[k]]
+        made.loops = self.own_loops[k]
         made.loop_piece = np.zeros(len(made.loops), np.int64)
         return made
 

@@ -450,7 +450,7 @@ def airs_around(
     return [
         make_air(
             uv[ends[k] : ends[k + 1]],
-            [loop - ends[k] for loop in island.loops_of[k]],
+            island.own_loops[k],
             triangulate,
             None if walls is None else walls[k],
         )

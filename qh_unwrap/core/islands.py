@@ -10,13 +10,12 @@ out are turned for the unwrap, and what is one-sided is cut; the mesh stays as i
 """
 
 from dataclasses import dataclass, fields
-from itertools import pairwise
 
 import numpy as np
 
 from .doubles import find_doubles
 from .joints import across_edges, meet, uv_vertices, without_doubled_diagonals, wound_back
-from .pieces import around_faces, components
+from .pieces import around_faces, components, parts_of
 from .winding import agreed
 
 
@@ -37,6 +36,7 @@ class Island:
     turned_faces: int  # faces that are inside out, not counting doubled ones
     one_sided_edges: int  # edges where it is cut since it is one-sided
     crowded_edges: int  # edges of its outline where more than two faces meet
+    is_redrawn: bool  # whether the mesh's own triangles are others than these
 
 
 def find_islands(
@@ -90,23 +90,26 @@ def find_islands(
     its_doubled, doubled_starts = _grouped(np.flatnonzero(doubled[triangle_face]), triangle_rank, count)
     first_corner, vertex_starts, island_vertex = _vertices(uv_vertex, corners, corner_rank, count)
 
+    redrawn = (triangles != drawn).any(axis=1)
+
     def counted(faces):
         return np.bincount(rank[faces], minlength=count).tolist()
 
     columns = {
-        "faces": _split(faces, face_starts),
-        "corners": _split(corners, corner_starts),
-        "corner_vertex": _split(island_vertex[corners], corner_starts),
-        "vertices": _split(corner_vertex[first_corner], vertex_starts),
-        "triangles": _split(island_vertex[triangles[its]], triangle_starts),
-        "triangle_corners": _split(triangles[its], triangle_starts),
-        "drawn_corners": _split(drawn[its], triangle_starts),
-        "doubled_corners": _split(drawn[its_doubled], doubled_starts),
+        "faces": parts_of(faces, face_starts),
+        "corners": parts_of(corners, corner_starts),
+        "corner_vertex": parts_of(island_vertex[corners], corner_starts),
+        "vertices": parts_of(corner_vertex[first_corner], vertex_starts),
+        "triangles": parts_of(island_vertex[triangles[its]], triangle_starts),
+        "triangle_corners": parts_of(triangles[its], triangle_starts),
+        "drawn_corners": parts_of(drawn[its], triangle_starts),
+        "doubled_corners": parts_of(drawn[its_doubled], doubled_starts),
         "own_corners": np.bincount(corner_rank[own_corners], minlength=count).tolist(),
         "doubled_faces": counted(doubled),
         "turned_faces": counted(turned),
         "one_sided_edges": counted(here[cut]),
         "crowded_edges": _crowded_edges(corner_edge[own_corners], corner_rank[own_corners], seam, count),
+        "is_redrawn": (np.bincount(triangle_rank[its], redrawn[its], count) > 0).tolist(),
     }
     in_order = (columns[field.name] for field in fields(Island))
     return [Island(*row) for row in zip(*in_order, strict=True)]
@@ -191,9 +194,3 @@ def _grouped(items, rank, count):
     own = rank[items]
     order = np.argsort(own, kind="stable")
     return items[order], np.searchsorted(own[order], np.arange(count))
-
-
-def _split(values, starts):
-    """The values of each island, where they begin at `starts`."""
-    edges = [*starts.tolist(), len(values)]
-    return [values[start:end] for start, end in pairwise(edges)]

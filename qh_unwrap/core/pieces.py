@@ -2,15 +2,25 @@
 """Arrays of several pieces laid end to end, and where each begins."""
 
 from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from .triangles import areas_in_space, corners_of, signed_areas
+
 
 def starts_of(arrays: Sequence[np.ndarray]) -> np.ndarray:
     """Where each of the arrays begins when they are joined, (p,)."""
-    return np.cumsum([0, *(len(each) for each in arrays[:-1])])
+    sizes = np.fromiter(map(len, arrays), np.intp, len(arrays))
+    return np.cumsum(sizes) - sizes
+
+
+def parts_of(values: np.ndarray, starts: np.ndarray) -> list[np.ndarray]:
+    """The values of each piece, where they begin at its place in `starts` (p,): `joined` undone."""
+    return [values[start:end] for start, end in pairwise([*starts.tolist(), len(values)])]
 
 
 def numbers(starts: np.ndarray, count: int) -> np.ndarray:
@@ -68,5 +78,55 @@ def joined(
     The k-th mesh has the points `points[k]` and the `triangles[k]` of these.
     """
     point_starts, triangle_starts = starts_of(points), starts_of(triangles)
-    moved = [its + start for its, start in zip(triangles, point_starts, strict=True)]
-    return np.concatenate(points), np.concatenate(moved), point_starts, triangle_starts
+    corners = np.concatenate(triangles)
+    corners = corners + np.repeat(point_starts, np.diff(triangle_starts, append=len(corners)))[:, None]
+    return np.concatenate(points), corners, point_starts, triangle_starts
+
+
+class Pieces:
+    """Several meshes as one: its points, its triangles, and where each of them begins in both.
+
+    Parameters
+    ----------
+    points : sequence of (n, 3)
+    triangles : sequence of (m, 3), at least one of each mesh
+    """
+
+    def __init__(self, points: Sequence[np.ndarray], triangles: Sequence[np.ndarray]):
+        self.points, self.triangles, self.starts, self._triangle_starts = joined(points, triangles)
+
+    @cached_property
+    def piece(self) -> np.ndarray:
+        """(n,), the piece of every point."""
+        return numbers(self.starts, len(self.points))
+
+    @cached_property
+    def triangle_piece(self) -> np.ndarray:
+        """(m,), the piece of every triangle."""
+        return numbers(self._triangle_starts, len(self.triangles))
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """(p,), in space."""
+        return self.sums(areas_in_space(self.points, self.triangles))
+
+    def areas_in(self, uv: np.ndarray) -> np.ndarray:
+        """The areas (p,) of the pieces in the map `uv` (n, 2), all triangles counted as positive."""
+        return self.sums(np.abs(signed_areas(corners_of(uv, self.triangles))))
+
+    def triangles_of(self, k: int) -> slice:
+        """The triangles of piece k."""
+        return slice(*np.append(self._triangle_starts, len(self.triangles))[k : k + 2])
+
+    def boxes(self, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The lower left and the upper right corners, (p, 2) each, of the boxes around the pieces in the map `uv`
+        (n, 2)."""
+        return np.minimum.reduceat(uv, self.starts), np.maximum.reduceat(uv, self.starts)
+
+    def sums(self, values: np.ndarray) -> np.ndarray:
+        """The sums (p,) of values (m,) over the triangles of each piece."""
+        return np.add.reduceat(values, self._triangle_starts)
+
+    def of_each(self, values: np.ndarray) -> list[np.ndarray]:
+        """The values (n, ...) at the points, piece by piece."""
+        return parts_of(values, self.starts)

@@ -1,110 +1,123 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Putting unwrapped islands where they belong: back in place, upright, or each into the unit square."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from .pieces import joined, numbers, starts_of
-from .triangles import areas_in_space, corners_of, signed_areas
+from .pieces import Pieces
+from .triangles import boxes_of, corners_of, signed_areas
 
 _FINEST = 1e-5  # side of a square with a triangle's area, by the layout's size, that can still be packed
 _STEEPEST_FLAT = 0.25  # slope, height by way along the island, up to which it lies flat and has no upper end
+_FIRST = np.zeros(1, int)  # where the one begins
 _THROWN = 16  # times the median growth of triangles, from which on one has a vertex that was thrown elsewhere
 
 
-def says_where(corners: np.ndarray) -> bool:
-    """Whether these UVs, given as triangles (t, 3, 2), say where an island belongs.
+def say_where(corners: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Whether the UVs of islands say where these belong, (k,) bool: triangles (t, 3, 2), of which each island's begin
+    at its place in `starts` (k,).
 
     They do if they have some area and are no pile of faces, as in a new UV map, where each face fills the square.
     """
-    if not len(corners) or not np.isfinite(corners).all():
-        return False
-    area = np.abs(signed_areas(corners)).sum()
-    extent = np.prod(np.ptp(corners.reshape(-1, 2), axis=0))
-    return bool(1e-6 * extent < area <= 1.01 * extent)
+    finite = np.isfinite(corners).all(axis=(1, 2))
+    corners = np.where(finite[:, None, None], corners, 0)
+    area = np.add.reduceat(np.abs(signed_areas(corners)), starts)
+    low, high = boxes_of(corners)
+    extent = np.prod(np.maximum.reduceat(high, starts) - np.minimum.reduceat(low, starts), axis=1)
+    return np.logical_and.reduceat(finite, starts) & (1e-6 * extent < area) & (area <= 1.01 * extent)
 
 
-def in_place(uv: np.ndarray, triangles: np.ndarray, old: np.ndarray) -> np.ndarray:
-    """The UVs (n, 2) of triangles (t, 3) moved, rotated and scaled onto `old`, the triangles' old UVs (t, 3, 2).
+def says_where(corners: np.ndarray) -> bool:
+    """The same of one island, (t, 3, 2), maybe without any triangles."""
+    return bool(len(corners) and say_where(corners, _FIRST)[0])
 
-    They get the old centre and area, and the rotation that fits best in the sense of least squares.  Where the old map
-    has flips, triangles that are far too large in it, as around a vertex thrown elsewhere, do not count.
-    """
-    new = uv[triangles]
-    signed = signed_areas(old)
-    if (signed * np.sign(signed.sum()) < 0).any():
-        growth = np.abs(signed) / np.maximum(np.abs(signed_areas(new)), np.finfo(float).tiny)
-        sound = growth <= _THROWN * np.median(growth[growth > 0])
-        new, old = new[sound], old[sound]
-    area, old_area = (float(np.abs(signed_areas(each)).sum()) for each in (new, old))
-    middle, old_middle = centre(new), centre(old)
-    z, w = ((each.reshape(-1, 2) - its) @ (1, 1j) for each, its in ((new, middle), (old, old_middle)))
-    rotation = np.vdot(z, w)
-    rotation = rotation / abs(rotation) if abs(rotation) > 1e-9 * np.linalg.norm(z) * np.linalg.norm(w) else 1.0
-    size = np.sqrt(old_area / area) if area > 0 else 1.0
-    moved = (uv - middle) @ (1, 1j) * rotation * size
-    return np.column_stack([moved.real, moved.imag]) + old_middle
+
+def are_mirrored(corners: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Whether most of the area of the UVs of islands, given as for `say_where`, is mirrored, (k,) bool."""
+    return np.add.reduceat(signed_areas(corners), starts) < 0
 
 
 def is_mirrored(corners: np.ndarray) -> bool:
-    """Whether most of the area of these UVs, given as triangles (t, 3, 2), is mirrored."""
-    return bool(signed_areas(corners).sum() < 0)
+    """The same of one island, (t, 3, 2)."""
+    return bool(are_mirrored(corners, _FIRST)[0])
 
 
-def upright(islands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]) -> list[np.ndarray]:
-    """The UVs of islands, each given as (uv, vertices, triangles, up), rotated so that what is up in space is up.
+def in_place(islands: Pieces, uv: np.ndarray, old: np.ndarray) -> np.ndarray:
+    """The UVs (n, 2) of islands moved, rotated and scaled onto `old`, their triangles' old UVs (t, 3, 2).
+
+    They get the old centres and areas, and the rotations that fit best in the sense of least squares.  Where an old map
+    has flips, triangles that are far too large in it, as around a vertex thrown elsewhere, do not count.
+    """
+    new, piece = corners_of(uv, islands.triangles), islands.triangle_piece
+    size, old_size = np.abs(signed_areas(new)), signed_areas(old)
+    flipped = old_size * np.sign(islands.sums(old_size))[piece] < 0
+    old_size = np.abs(old_size)
+    sound = np.ones(len(old), bool)
+    for k in np.unique(piece[flipped]).tolist():
+        its = islands.triangles_of(k)
+        growth = old_size[its] / np.maximum(size[its], np.finfo(float).tiny)
+        sound[its] = growth <= _THROWN * np.median(growth[growth > 0])
+    size, old_size = np.where(sound, size, 0), np.where(sound, old_size, 0)
+    middle, old_middle = _centres(islands, new, size), _centres(islands, old, old_size)
+    z, w = (
+        sound[:, None] * ((corners - its[piece, None]) @ (1, 1j)) for corners, its in ((new, middle), (old, old_middle))
+    )
+    turn = islands.sums((z.conj() * w).sum(axis=1))
+    lengths = (np.sqrt(islands.sums((np.abs(each) ** 2).sum(axis=1))) for each in (z, w))
+    clear = np.abs(turn) > 1e-9 * np.prod(list(lengths), axis=0)
+    turn = np.where(clear, turn / np.where(clear, np.abs(turn), 1), 1)
+    area, old_area = islands.sums(size), islands.sums(old_size)
+    turn = turn * np.where(area > 0, np.sqrt(old_area / np.where(area > 0, area, 1)), 1)
+    moved = (uv - middle[islands.piece]) @ (1, 1j) * turn[islands.piece]
+    return np.column_stack([moved.real, moved.imag]) + old_middle[islands.piece]
+
+
+def upright(islands: Pieces, uv: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """The UVs (n, 2) of islands rotated so that what is up in space, for each of them a vector in `up` (k, 3), is up.
 
     Where one lies too flat for that, it is rotated so that its bounding box is the smallest.
     """
-    uvs = [uv for uv, _, _, _ in islands]
-    heights = [vertices @ up for _, vertices, _, up in islands]
-    lifted = [np.column_stack(each) for each in zip(uvs, heights, strict=True)]
-    points, triangles, _, starts = joined(lifted, [its for _, _, its, _ in islands])
-    x, y, height = corners_of(points, triangles).T
-    piece = numbers(starts, len(triangles))
-    weight = np.abs(signed_areas(corners_of(points[:, :2], triangles)))
+    heights = np.einsum("nc,nc->n", islands.points, up[islands.piece])
+    x, y, height = corners_of(np.column_stack([uv, heights]), islands.triangles).T
+    weight = np.abs(signed_areas(corners_of(uv, islands.triangles)))
 
     def sums(values):
-        return np.add.reduceat(weight * values.sum(axis=0), starts)
+        return islands.sums(weight * values.sum(axis=0))
 
-    total = np.add.reduceat(weight, starts)
-    size = np.sqrt(areas([(vertices, its) for _, vertices, its, _ in islands]) / total)
+    total, piece = islands.sums(weight), islands.triangle_piece
+    size = np.sqrt(islands.areas / total)
     x, y = ((along - (sums(along) / (3 * total))[piece]) * size[piece] for along in (x, y))
     # The slope of the height over the layout, by least squares.
     xx, xy, yy, xh, yh = (sums(one * other) for one, other in ((x, x), (x, y), (y, y), (x, height), (y, height)))
     spread = np.moveaxis(np.array([[xx, xy], [xy, yy]]), 2, 0)
-    slope = (np.linalg.pinv(spread) @ np.column_stack([xh, yh])[:, :, None])[:, :, 0]
-    steepness = np.linalg.norm(slope, axis=1)
-    rotated = []
-    for uv, steep, way in zip(uvs, steepness > _STEEPEST_FLAT, slope @ (1, 1j), strict=True):
-        rotated.append(_rotated(uv, 1j * abs(way) / way) if steep else _in_smallest_box(uv))
-    return rotated
+    slope = (np.linalg.pinv(spread) @ np.column_stack([xh, yh])[:, :, None])[:, :, 0] @ (1, 1j)
+    steep = np.abs(slope) > _STEEPEST_FLAT
+    rotation = np.where(steep, 1j, 1.0)
+    rotation[steep] *= np.abs(slope[steep]) / slope[steep]
+    if not steep.all():
+        uvs = islands.of_each(uv)
+        rotation[~steep] = [_into_smallest_box(uvs[k]) for k in np.flatnonzero(~steep)]
+    rotated = uv @ (1, 1j) * rotation[islands.piece]
+    return np.column_stack([rotated.real, rotated.imag])
 
 
-def _in_smallest_box(uv):
-    """UVs (n, 2) rotated so that their bounding box is the smallest, and lies rather than stands.
+def _into_smallest_box(uv):
+    """By what to rotate UVs (n, 2), as a complex number of length 1, so that their bounding box is the smallest, and
+    lies rather than stands.
 
     One of its sides then lies along a side of the convex hull, so only these directions are tried.
     """
     try:
         outline = uv[ConvexHull(uv).vertices]
     except QhullError:
-        return uv
+        return 1.0
     side = (np.roll(outline, -1, axis=0) - outline) @ (1, 1j)
     rotations = np.abs(side[side != 0]) / side[side != 0]
     rotated = (outline @ (1, 1j))[:, None] * rotations
     sizes = np.column_stack([np.ptp(rotated.real, axis=0), np.ptp(rotated.imag, axis=0)])
     best = np.argmin(sizes.prod(axis=1))
     width, height = sizes[best]
-    return _rotated(uv, rotations[best] * (1 if width >= height else -1j))
-
-
-def _rotated(uv, rotation):
-    """UVs (n, 2) multiplied, as complex numbers, by one of length 1."""
-    z = uv @ (1, 1j) * rotation
-    return np.column_stack([z.real, z.imag])
+    return rotations[best] * (1 if width >= height else -1j)
 
 
 def free_tile(rest: np.ndarray) -> int:
@@ -121,54 +134,33 @@ def free_tile(rest: np.ndarray) -> int:
 
 def in_unit_square(uv: np.ndarray) -> np.ndarray:
     """The UVs (n, 2) scaled until the longer side of their box is 1, in the middle of the 0 to 1 square."""
-    (low,), (high,) = boxes([uv])
-    size = high - low
+    low, size = uv.min(axis=0), np.ptp(uv, axis=0)
     scale = 1 / size.max() if size.max() > 0 else 1.0
     return (uv - low) * scale + (1 - size * scale) / 2
 
 
-def to_scale(
-    islands: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]], importance: np.ndarray | None = None
-) -> tuple[list[np.ndarray], np.ndarray]:
-    """The UVs of islands, each given as (uv, vertices, triangles), scaled to the same texel density and about the area
-    1 all together; and which, (k,) bool, are larger, since single precision could not tell their vertices apart.
+def to_scale(islands: Pieces, uv: np.ndarray, importance: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """The UVs (n, 2) of islands scaled to the same texel density and about the area 1 all together; and which, (k,)
+    bool, are larger, since single precision could not tell their vertices apart.
 
     `importance` (k,) is what the islands' areas count times, by default 1.
     """
-    uvs, vertices, triangles = (list(each) for each in zip(*islands, strict=True))
-    in_space, in_layout = (
-        areas(list(zip(vertices, triangles, strict=True))),
-        uv_areas(list(zip(uvs, triangles, strict=True))),
-    )
-    if importance is not None:
-        in_space = in_space * importance
+    in_space = islands.areas if importance is None else islands.areas * importance
     share = in_space / in_space.sum()
-    least = _FINEST**2 * np.array([len(each) for each in triangles])
-    scale = np.sqrt(np.maximum(share, least) / np.maximum(in_layout, 1e-300))
-    return [uv * size for uv, size in zip(uvs, scale.tolist(), strict=True)], share < least
+    least = _FINEST**2 * np.bincount(islands.triangle_piece)
+    scale = np.sqrt(np.maximum(share, least) / np.maximum(islands.areas_in(uv), 1e-300))
+    return uv * scale[islands.piece, None], share < least
 
 
-def areas(islands: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """The areas in space, (k,), of islands given as (vertices, triangles)."""
-    points, triangles, _, starts = joined(*zip(*islands, strict=True))
-    return np.add.reduceat(areas_in_space(points, triangles), starts)
+def centres(islands: Pieces, uv: np.ndarray) -> np.ndarray:
+    """The centres of area, (k, 2), of islands with the UVs (n, 2), all triangles counted as positive."""
+    corners = corners_of(uv, islands.triangles)
+    return _centres(islands, corners, np.abs(signed_areas(corners)))
 
 
-def uv_areas(islands: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """The areas in the layout, (k,), of islands given as (uv, triangles)."""
-    uv, triangles, _, starts = joined(*zip(*islands, strict=True))
-    return np.add.reduceat(np.abs(signed_areas(corners_of(uv, triangles))), starts)
-
-
-def boxes(uvs: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The lower left and the upper right corners, (k, 2) each, of the boxes around islands with these UVs, (n, 2)."""
-    starts, uv = starts_of(uvs), np.concatenate(uvs)
-    return np.minimum.reduceat(uv, starts), np.maximum.reduceat(uv, starts)
-
-
-def centre(corners: np.ndarray) -> np.ndarray:
-    """The centre of area, (2,), of triangles (t, 3, 2), all counted as positive."""
-    weight = np.abs(signed_areas(corners))
-    if not weight.any():
-        weight = np.ones(len(corners))
-    return weight @ corners.mean(axis=1) / weight.sum()
+def _centres(islands, corners, weight):
+    """The mean places (k, 2) of islands' triangles (t, 3, 2), which count by their `weight` (t,); those of islands
+    without any count alike."""
+    weight = np.where((islands.sums(weight) > 0)[islands.triangle_piece], weight, 1)
+    sums = [islands.sums(weight * along) for along in corners.mean(axis=1).T]
+    return (sums / islands.sums(weight)).T

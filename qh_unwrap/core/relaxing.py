@@ -16,6 +16,7 @@ from .chart import Surface, numbered_edges
 from .distortion import measure
 from .energy import energies
 from .errors import BorderError, ClosedError, GenusError, UnwrapError, UVError
+from .pieces import Pieces
 from .placing import in_place, is_mirrored, says_where
 from .relax_settings import RelaxSettings, StraightenSettings
 from .report import Result, Shape
@@ -176,7 +177,8 @@ def _settled(shape, task, result, settings):
     corners = corners_of(old, shape.triangles)
     if task.is_loose:
         uv = uv * (-1, 1) if task.mirrored else uv
-        uv = in_place(uv, shape.triangles, corners) if says_where(corners) else uv
+        if says_where(corners):
+            uv = in_place(Pieces([surface.vertices], [surface.triangles]), uv, corners)
     was_valid = _is_valid(surface, old)
     # Where triangles have an importance, the energy that has fallen is another one.
     if was_valid and shape.importance is None and not _gains(surface, old, uv, settings.balance):

@@ -15,6 +15,7 @@ from .delaunay import triangulate as own_triangulate
 from .distortion import measure_pieces
 from .errors import PinError, UnwrapError, UVError
 from .improvement import Steps
+from .pieces import parts_of
 from .report import Report, Result, Shape, State, face_warnings
 from .settings import Settings
 from .stepping import STEP
@@ -174,7 +175,10 @@ class Unwrapper:
             certified[~certified] = certified_pieces(part, chosen[rows])
         flat = surface.sums(surface.degenerate.astype(int)).tolist()
         ends = np.append(surface.triangle_starts, len(surface.triangles)).tolist()
-        for k, first in enumerate(surface.vertex_starts.tolist()):
+        uvs = parts_of(chosen * batch.mirror[surface.vertex_piece], surface.vertex_starts)
+        loops, has_uv = surface.own_loops, batch.has_uv.tolist()
+        its = zip(certified.tolist(), course.converged.tolist(), (batch.mirror[:, 0] < 0).tolist(), strict=True)
+        for k, (injective, converged, mirrored) in enumerate(its):
             if k in course.faults:
                 yield course.faults[k]
                 continue
@@ -186,15 +190,14 @@ class Unwrapper:
                 its = surface.degenerate[ends[k] : ends[k + 1]]
                 warnings += face_warnings(its, given.face(int(batch.index[k])))
             report = Report(
-                before=before[k] if batch.has_uv[k] else None,
+                before=before[k] if has_uv[k] else None,
                 initial=initial[k],
                 after=after[k],
                 iterations=len(course.changes[k]),
-                converged=bool(course.converged[k]),
+                converged=converged,
                 changes=tuple(course.changes[k]),
-                injective=bool(certified[k]) and not (after[k].flips or after[k].collapsed),
-                mirrored=bool(batch.mirror[k, 0] < 0),
+                injective=injective and not (after[k].flips or after[k].collapsed),
+                mirrored=mirrored,
                 warnings=warnings,
             )
-            uv = chosen[batch.rows_of(k)] * batch.mirror[k]
-            yield Result(uv, report, [loop - first for loop in surface.loops_of[k]])
+            yield Result(uvs[k], report, loops[k])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import errors
-from .pieces import components, first_and_last, numbers
+from .pieces import components, first_and_last, numbers, parts_of
 
 _KEYS = 2_000_000  # vertices, up to which the numbers of three go into one number of 64 bits
 
@@ -152,23 +152,15 @@ class Topology(HalfEdges):
         tangled[self.vertex_piece[self.edges[self.crowded | self.misaligned].ravel()]] = True
         tangled[self.vertex_piece[np.flatnonzero(np.bincount(start, minlength=self.vertex_count) > 1)]] = True
         clear = ~tangled[self.vertex_piece[start]]
-        following = dict(zip(start[clear].tolist(), end[clear].tolist(), strict=True))
-        loops = []
-        while following:
-            first, vertex = following.popitem()
-            loop = [first]
-            while vertex != first:
-                loop.append(vertex)
-                vertex = following.pop(vertex)
-            # Start at the smallest index: the loop does not depend on the order of the triangles.
-            least = loop.index(min(loop))
-            loops.append(np.array(loop[least:] + loop[:least]))
-        return loops, tangled
+        number = np.empty(self.vertex_count, np.intp)
+        number[start[clear]] = np.arange(clear.sum())
+        return _loops(start[clear], number[end[clear]]), tangled
 
     @property
     def loops(self) -> list[np.ndarray]:
-        """The boundary loops, each in the direction of its triangles' winding, in no order; none of a piece in which
-        they cannot be told apart, since it is pinched, crowded or misaligned."""
+        """The boundary loops, each in the direction of its triangles' winding and from its smallest vertex on, by which
+        they are sorted; none of a piece in which they cannot be told apart, since it is pinched, crowded or misaligned.
+        """
         return self._traced[0]
 
     @cached_property
@@ -268,6 +260,24 @@ def _misaligned(number, triangles):
 def _pinched(number, triangles):
     text = f"at {count(number, 'vertex', 'vertices')} the surface touches itself: split it there"
     return errors.NonManifoldVertexError(text, triangles)
+
+
+def _loops(vertex, following):
+    """The loops of vertices (k,), of which each is followed by that with the number `following` (k,): each loop begins
+    at its smallest vertex, and they are sorted by it.
+
+    All go around at once, by steps that double.
+    """
+    least, ahead = vertex, following
+    while (least > least[ahead]).any():
+        least, ahead = np.minimum(least, least[ahead]), ahead[ahead]
+    begins = vertex == least
+    steps, ahead = (~begins).astype(np.intp), np.where(begins, np.arange(len(vertex)), following)
+    while not begins[ahead].all():
+        steps, ahead = steps + steps[ahead], ahead[ahead]
+    # Of each loop first the beginning, and then what is the farthest from it.
+    order = np.lexsort((np.where(begins, -len(vertex), -steps), least))
+    return parts_of(vertex[order], np.flatnonzero(begins[order]))
 
 
 def checked_arrays(vertices: ArrayLike, triangles: ArrayLike) -> tuple[np.ndarray, np.ndarray]:

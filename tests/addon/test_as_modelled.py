@@ -276,8 +276,8 @@ def test_what_rounding_would_flip_is_opened(seed, monkeypatch):
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.random((80, 2)), np.zeros(80)])
     faces = Delaunay(points[:, :2]).simplices.tolist()
-    monkeypatch.setattr(layout.placing, "upright", lambda islands: [uv + (150_000, 0) for uv, *_ in islands])
-    monkeypatch.setattr(layout.packing, "pack", lambda groups, *_: [uv for uv, _ in groups[1.0]])
+    monkeypatch.setattr(layout.placing, "upright", lambda islands, uv, up: uv + (150_000, 0))
+    monkeypatch.setattr(layout.packing, "pack", lambda islands, uv, *_: uv)
     opened, (report,) = unwrapped(points, faces)
     assert report["injective"]
     assert uvs(opened)[:, 0].min() > 75_000

@@ -13,6 +13,7 @@ from qh_unwrap.addon import files, mesh_arrays, operators
 from qh_unwrap.addon.options import MeshOptions
 from qh_unwrap.core import placing
 from qh_unwrap.core.islands import find_islands
+from qh_unwrap.core.pieces import Pieces
 
 _MESHES = os.environ.get("QH_MESHES")
 
@@ -43,19 +44,24 @@ def beast():
 def test_texel_density_is_equal(beast):
     islands, _ = beast
     assert len(islands) == 20
-    in_space = placing.areas([(vertices, triangles) for vertices, triangles, _ in islands])
+    in_space = together(islands).areas
     density = [uv_area(uv, triangles) for _, triangles, uv in islands] / in_space
     assert np.ptp(density) < 0.01 * np.mean(density)
 
 
 def test_islands_are_upright_and_not_mirrored(beast):
     islands, up = beast
-    again = placing.upright([(uv, vertices, triangles, up) for vertices, triangles, uv in islands])
-    for (_, triangles, uv), turned in zip(islands, again, strict=True):
+    both = together(islands)
+    again = placing.upright(both, np.concatenate([uv for _, _, uv in islands]), np.tile(up, (len(islands), 1)))
+    for (_, triangles, uv), turned in zip(islands, both.of_each(again), strict=True):
         assert uv_area(uv, triangles) > 0
         edges = triangles[:, 1], triangles[:, 0]
         z, w = ((each[edges[0]] - each[edges[1]]) @ (1, 1j) for each in (uv, turned))
         assert abs(np.angle(np.vdot(z, w))) < 1e-3, "turning it again changes nothing"
+
+
+def together(islands):
+    return Pieces([vertices for vertices, _, _ in islands], [triangles for _, triangles, _ in islands])
 
 
 def uv_area(uv, triangles):

@@ -8,6 +8,7 @@ from scipy.spatial import Delaunay
 from qh_unwrap.addon import operators
 from qh_unwrap.addon.outcome import sentences, summary
 from qh_unwrap.core import placing
+from qh_unwrap.core.pieces import Pieces
 
 
 def set_uvs(obj, values):
@@ -45,11 +46,27 @@ def test_original_keeps_centre_area_and_turn(angle):
     assert abs(np.angle(np.vdot(z, w))) < 0.02
 
 
+def in_place(uv, triangles, old):
+    return placing.in_place(Pieces([np.zeros((len(uv), 3))], [triangles]), uv, old)
+
+
 def test_in_place_undoes_any_similarity():
     random = np.random.default_rng(1)
     uv, triangles = random.random((5, 2)), np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4)])
     moved = turned(uv, 2.0, 3.7, (5, -8))
-    assert np.allclose(placing.in_place(moved, triangles, uv[triangles]), uv)
+    assert np.allclose(in_place(moved, triangles, uv[triangles]), uv)
+
+
+def test_islands_are_put_in_place_together_as_alone():
+    random = np.random.default_rng(1)
+    one, other = (np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4)])[:count] for count in (3, 2))
+    uvs_, olds = ([random.random((count, 2)) for count in (5, 4)] for _ in range(2))
+    olds[1][3] = (90, 90)  # thrown elsewhere
+    old = [its[triangles] for its, triangles in zip(olds, (one, other), strict=True)]
+    both = Pieces([np.zeros((5, 3)), np.zeros((4, 3))], [one, other])
+    found = both.of_each(placing.in_place(both, np.concatenate(uvs_), np.concatenate(old)))
+    for together, uv, triangles, its in zip(found, uvs_, (one, other), old, strict=True):
+        np.testing.assert_allclose(together, in_place(uv, triangles, its), rtol=1e-12)
 
 
 def test_one_vertex_thrown_elsewhere_moves_nothing_else():
@@ -68,12 +85,12 @@ def test_a_map_with_flips_that_mostly_lies_in_one_place_keeps_its_size():
     triangles = np.array([(0, 1, 2), (0, 2, 3), (1, 4, 6), (1, 6, 2), (4, 5, 7), (4, 7, 6)])
     old = np.zeros((6, 3, 2))
     old[0], old[1] = points[triangles[0]], points[triangles[1]][::-1]  # the second one is flipped
-    assert np.ptp(placing.in_place(points, triangles, old), axis=0).min() > 0.1
+    assert np.ptp(in_place(points, triangles, old), axis=0).min() > 0.1
 
 
 def test_in_place_has_numbers_even_without_area():
     uv, triangles = np.zeros((3, 2)), np.array([(0, 1, 2)])
-    assert np.isfinite(placing.in_place(uv, triangles, np.array([[(0, 0), (1, 0), (0, 1)]]))).all()
+    assert np.isfinite(in_place(uv, triangles, np.array([[(0, 0), (1, 0), (0, 1)]]))).all()
 
 
 def test_new_islands_are_packed_in_the_unit_square():
