@@ -12,7 +12,7 @@ from ..core.relaxing import relax_islands, rim, straighten_islands
 from ..core.stepping import mapped
 from ..core.straightening import Polygons, rectangle, straight_lines
 from . import judging, layout, mesh_arrays, modes, stacking, texels
-from .old_maps import OldMaps
+from .mesh_islands import MeshIslands
 from .outcome import Outcome
 from .selection import Target
 from .unwrapping import are_as_read, keep, tell_of_density, write
@@ -110,10 +110,10 @@ def _works(obj, mesh, connected, faces, moving):
     """A work for each island that the faces make, of which the corners that are `moving`, (c,) bool, may move."""
     islands = connected.islands(faces, mesh.corner_triangles)
     target = Target(obj, faces)
-    old_maps, nowhere = OldMaps(mesh, islands), np.zeros(len(moving), dtype=bool)
+    together, nowhere = MeshIslands(mesh, islands), np.zeros(len(moving), dtype=bool)
     for number, island in enumerate(islands):
         outcome = Outcome(obj.name, number + 1, island.faces, alone=len(islands) == 1)
-        work = Work(target, mesh, island, outcome, Settings(boundary='KEEP'), nowhere, old_maps, number)
+        work = Work(target, mesh, island, outcome, Settings(boundary='KEEP'), nowhere, together, number)
         work.connected = connected
         work.moving = np.zeros(len(island.vertices), dtype=bool)
         work.moving[island.corner_vertex[moving[island.corners]]] = True

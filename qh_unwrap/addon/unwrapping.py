@@ -16,7 +16,7 @@ from ..core.stepping import mapped
 from ..core.unwrapping import unwrap_variously
 from . import judging, layout, mesh_arrays, modes, stacking, texels
 from .hints import hint_at_seams
-from .old_maps import OldMaps
+from .mesh_islands import MeshIslands
 from .options import MeshOptions
 from .outcome import Outcome, count
 from .selection import Target
@@ -100,10 +100,10 @@ def _works(target, mesh, settings):
     if stays_attached and mesh.uv is not None:
         hanging = attached(*topology, mesh.uv)
     islands = find_islands(*topology, mesh.corner_triangles)
-    old_maps = OldMaps(mesh, islands)
+    together = MeshIslands(mesh, islands)
     for number, island in enumerate(islands):
         outcome = Outcome(obj.name, number + 1, island.faces, alone=len(islands) == 1)
-        yield Work(target, mesh, island, outcome, settings, hanging, old_maps, number)
+        yield Work(target, mesh, island, outcome, settings, hanging, together, number)
 
 
 def _take(cut, work):

@@ -14,7 +14,7 @@ from ..core.regions import Connected
 from ..core.straightening import Straight
 from ..core.triangles import corners_of, signed_areas
 from . import mesh_arrays
-from .old_maps import OldMaps
+from .mesh_islands import MeshIslands
 from .outcome import Outcome
 from .selection import Target
 
@@ -29,7 +29,7 @@ class Work:
     outcome: Outcome
     settings: Settings
     attached: np.ndarray  # (c,) bool, the mesh's corners that hang on faces that are not unwrapped
-    old_maps: OldMaps  # of its mesh's islands,
+    together: MeshIslands  # of its mesh's islands,
     number: int  # and which of these it is
     uv: np.ndarray | None = None  # (n, 2) the new ones
     loops: list | None = None  # its boundary
@@ -47,7 +47,7 @@ class Work:
     @property
     def aspect(self):
         """(2,) what to multiply UVs with: of the image that most faces show."""
-        return self.old_maps.aspects[self.number]
+        return self.together.aspects[self.number]
 
     @cached_property
     def image(self):
@@ -67,12 +67,12 @@ class Work:
     @property
     def raw_uv(self):
         """The same where there is a map, whatever is in it."""
-        return self.old_maps.uvs[self.number]
+        return self.together.uvs[self.number]
 
     @property
     def uv_fault(self):
         """Why the map has no UVs for it though there is a map, or an empty text."""
-        return "" if self.mesh.uv is None else self.old_maps.faults[self.number]
+        return "" if self.mesh.uv is None else self.together.faults[self.number]
 
     @property
     def can_stay(self):
@@ -91,27 +91,30 @@ class Work:
         """Whether its old UVs say where it belongs."""
         if self.old_uv is None or self.is_fresh or self.has_new_seams:
             return False
-        return self.old_maps.say_where[self.number]
+        return self.together.say_where[self.number]
 
     @property
     def old_triangles(self):
         """The triangles' old UVs (t, 3, 2)."""
-        return self.old_maps.triangles[self.number]
+        return self.together.triangles[self.number]
 
     @property
     def was_mirrored(self):
         """Whether most of the area of its old UVs is mirrored."""
-        return self.old_maps.are_mirrored[self.number]
+        return self.together.are_mirrored[self.number]
 
-    @cached_property
+    @property
     def vertices(self):
-        return self.mesh.vertices[self.island.vertices]
+        """(n, 3)"""
+        return self.together.vertices[self.number]
 
-    @cached_property
+    @property
     def importance(self):
         """(t,) how many times as large each triangle shall be as one without weights, None if all shall be alike."""
-        if self.mesh.importance is None:
-            return None
+        return None if self.mesh.importance is None else self._importance
+
+    @cached_property
+    def _importance(self):
         return np.exp(self.mesh.importance[self.island.vertices][self.triangles].mean(axis=1))
 
     @property
@@ -133,13 +136,13 @@ class Work:
     @property
     def triangle_faces(self):
         """(t,) the face of the mesh that each triangle is a part of."""
-        return self.mesh.corner_faces[self.island.triangle_corners[:, 0]]
+        return self.together.triangle_faces[self.number]
 
     @property
     def stayed(self):
         """(n,) bool, the vertices whose UVs are the old ones, and the UVs (k, 2) of these, to the last bit."""
         stayed = (self.uv == self.old_uv).all(axis=1)
-        return stayed, self.mesh.uv[self.old_maps.sources[self.number][stayed]]
+        return stayed, self.mesh.uv[self.together.sources[self.number][stayed]]
 
     @property
     def written(self):
@@ -152,12 +155,12 @@ class Work:
     @property
     def is_cut(self):
         """Whether the old UVs have cuts where there is no seam."""
-        return self.old_maps.are_cut[self.number]
+        return self.together.are_cut[self.number]
 
     @property
     def is_fresh(self):
         """Whether its old UVs are those of a new map, which say nothing; pinned ones always do."""
-        return self.old_maps.are_fresh[self.number]
+        return self.together.are_fresh[self.number]
 
     @property
     def drawn(self):

@@ -41,7 +41,7 @@ class Batch:
     @property
     def has_pins(self) -> np.ndarray:
         """(p,) bool"""
-        return np.logical_or.reduceat(self.pinned.any(axis=1), self.surface.vertex_starts)
+        return np.logical_or.reduceat(self.pinned[:, 0] | self.pinned[:, 1], self.surface.vertex_starts)
 
     @property
     def has_partners(self) -> np.ndarray:
@@ -76,8 +76,8 @@ class Batch:
 
     def apart(self, uv: np.ndarray) -> np.ndarray:
         """In which pieces (p,) bool of the map `uv` (n, 2) pins are elsewhere than they are to be."""
-        away = (self.pinned & (uv != self.uv)).any(axis=1)
-        return np.logical_or.reduceat(away, self.surface.vertex_starts)
+        away = self.pinned & (uv != self.uv)
+        return np.logical_or.reduceat(away[:, 0] | away[:, 1], self.surface.vertex_starts)
 
     def rows(self, pieces: np.ndarray) -> np.ndarray:
         """(n,) bool, the vertices of the chosen pieces, (p,) bool."""

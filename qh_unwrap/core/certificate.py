@@ -7,10 +7,11 @@ It speaks of the 32-bit floats that Blender stores.  Whoever certifies what Blen
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .pieces import starts_of
 from .triangles import by_parts, corners_of
 
 if TYPE_CHECKING:
@@ -19,6 +20,19 @@ if TYPE_CHECKING:
 _CROWDED = 30  # pairs that lie side by side for each box, from which on strips pay
 _MOST = 1_000_000  # strips of all groups, that rounding can tell apart
 _PORTION = 100_000  # pairs of boxes that are looked at together, about: it bounds the memory
+
+
+class Outlines(NamedTuple):
+    """Closed polygons, one after another."""
+
+    points: np.ndarray
+    """(n, 2)"""
+    first: np.ndarray
+    """(k,), where each polygon begins."""
+
+
+Polygons = Sequence[np.ndarray] | Outlines
+"""Closed polygons, the points (n, 2) of each."""
 
 
 def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -106,8 +120,7 @@ def are_injective(
     wrong[piece[orientation(uv, triangles) <= 0]] = True
     if wrong.all():
         return ~wrong
-    stored = as_stored(uv)
-    polygons = [stored[loop] for loop in loops]
+    polygons = Outlines(as_stored(uv)[np.concatenate(loops)], starts_of(loops))
     # Triangles of positive area leave the outer loop counter-clockwise and the others clockwise, if all are simple.
     wrong |= np.bincount(loop_piece, enclosed_areas(polygons) > 0) != 1
     return ~are_crossed(polygons, loop_piece, wrong)
@@ -133,7 +146,7 @@ def enclosed_area(points: np.ndarray) -> float:
     return enclosed_areas([points])[0]
 
 
-def enclosed_areas(polygons: Sequence[np.ndarray]) -> np.ndarray:
+def enclosed_areas(polygons: Polygons) -> np.ndarray:
     """The same of every polygon, (k,)."""
     start, following, first = _sides(polygons)
     origin = np.repeat(start[first], np.diff(first, append=len(start)), axis=0)
@@ -144,63 +157,68 @@ def enclosed_areas(polygons: Sequence[np.ndarray]) -> np.ndarray:
 def _sides(polygons):
     """Where the sides of all closed polygons start, (n, 2), the number of the side that follows each, (n,), and that of
     each polygon's first side, (k,)."""
-    size = np.array([len(points) for points in polygons])
-    first = np.cumsum(size) - size
-    following = np.arange(1, size.sum() + 1)
-    following[first + size - 1] = first
-    return np.concatenate(polygons), following, first
+    if not isinstance(polygons, Outlines):
+        polygons = Outlines(np.concatenate(polygons), starts_of(polygons))
+    start, first = polygons
+    following = np.arange(1, len(start) + 1)
+    following[np.append(first[1:], len(start)) - 1] = first
+    return start, following, first
 
 
-def count_crossings(polygons: Sequence[np.ndarray], touching: bool = False) -> int:
+def count_crossings(polygons: Polygons, touching: bool = False) -> int:
     """How many pairs of sides of the closed polygons, each (n, 2), properly cross, or also touch, exactly."""
     return int(crossings(polygons, np.zeros(len(polygons), int), touching)[0])
 
 
-def crossings(polygons: Sequence[np.ndarray], group: np.ndarray, touching: bool = False) -> np.ndarray:
+def crossings(polygons: Polygons, group: np.ndarray, touching: bool = False) -> np.ndarray:
     """The same for every group of polygons, (g,); `group` (k,) is the number of each polygon's group."""
-    found = np.zeros(group.max() + 1, int)
+    found, of = np.zeros(group.max() + 1, int), _groups(polygons, group)
     for sides in crossing_sides(polygons, group, touching):
-        found += np.bincount(_group_of(sides[0], polygons, group), minlength=len(found))
+        found += np.bincount(of[sides[0]], minlength=len(found))
     return found
 
 
-def are_crossed(polygons: Sequence[np.ndarray], group: np.ndarray, known: np.ndarray | None = None) -> np.ndarray:
+def are_crossed(polygons: Polygons, group: np.ndarray, known: np.ndarray | None = None) -> np.ndarray:
     """In which groups of polygons sides cross or touch, exactly, (g,) bool; `known` (g,) bool are some that count as
     such anyway."""
-    found = np.zeros(group.max() + 1, bool) if known is None else known.copy()
+    found, of = np.zeros(group.max() + 1, bool) if known is None else known.copy(), _groups(polygons, group)
     for sides in crossing_sides(polygons, group, touching=True):
-        found[_group_of(sides[0], polygons, group)] = True
+        found[of[sides[0]]] = True
         if found.all():  # thousands of sides may lie one over the other
             break
     return found
 
 
-def _group_of(sides, polygons, group):
-    return np.repeat(group, [len(points) for points in polygons])[sides]
+def _groups(polygons, group):
+    """The group of every side, (n,)."""
+    start, _, first = _sides(polygons)
+    return np.repeat(group, np.diff(first, append=len(start)))
 
 
 def crossing_sides(
-    polygons: Sequence[np.ndarray], group: np.ndarray, touching: bool = False
+    polygons: Polygons, group: np.ndarray, touching: bool = False
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield the pairs of sides, of polygons of one group, that properly cross, or also touch, exactly, as two arrays of
     numbers (k,), some at a time.  Sides are numbered polygon after polygon."""
-    start, following, first = _sides(polygons)
+    start, following, _ = _sides(polygons)
     end = start[following]
-    group = np.repeat(group, np.diff(first, append=len(start)))
+    group = _groups(polygons, group)
     if touching:  # sides that run back over the one before
         back = end - start, end[following] - end
         on_a_line = turn(start, end, end[following]) == 0
         side = np.flatnonzero(on_a_line & ((back[0] * back[1]).sum(axis=1) <= 0))
         yield side, following[side]
     for one, other in near_boxes(np.minimum(start, end), np.maximum(start, end), group):
+        # Most are neighbours, which touch in the vertex between them and cross nowhere.
+        apart = (following[one] != other) & (following[other] != one)
+        one, other = one[apart], other[apart]
         a, b, c, d = start[one], end[one], start[other], end[other]
-        across, back = turn(a, b, c) * turn(a, b, d), turn(c, d, a) * turn(c, d, b)
-        if touching:
-            neighbours = (following[one] == other) | (following[other] == one)
-            crossing = (across <= 0) & (back <= 0) & ~neighbours
-        else:
-            crossing = (across < 0) & (back < 0)
-        yield one[crossing], other[crossing]
+        across = turn(a, b, c) * turn(a, b, d)
+        meet = across <= 0 if touching else across < 0
+        one, other, (a, b, c, d) = one[meet], other[meet], (each[meet] for each in (a, b, c, d))
+        back = turn(c, d, a) * turn(c, d, b)
+        meet = back <= 0 if touching else back < 0
+        yield one[meet], other[meet]
 
 
 def near_boxes(low: np.ndarray, high: np.ndarray, group: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -210,20 +228,23 @@ def near_boxes(low: np.ndarray, high: np.ndarray, group: np.ndarray) -> Iterator
     side, the plane is cut into strips, and each strip has its part of a box.
     """
     axis = int(np.argmax(np.ptp(low, axis=0)))
-    box, first = np.arange(len(low)), np.zeros(len(low), int)
-    strip = first
-    order, count = _swept(low[:, axis], high[:, axis], group)
-    if count.sum() > _CROWDED * len(box):
-        box, strip, first = _strips(low[:, 1 - axis], high[:, 1 - axis], _MOST // (group.max() + 1))
+    (left, lower), (right, upper) = ((each[:, axis], each[:, 1 - axis]) for each in (low, high))
+    box = strip = first = None
+    order, count = _swept(left, right, group)
+    if count.sum() > _CROWDED * len(left):
+        box, strip, first = _strips(lower, upper, _MOST // (group.max() + 1))
         group = group[box] * (strip.max() + 1) + strip
-        order, count = _swept(low[box, axis], high[box, axis], group)
+        order, count = _swept(left[box], right[box], group)
     for part in np.array_split(np.arange(len(order)), 1 + count.sum() // _PORTION):
         total = np.cumsum(count[part])
         one = np.repeat(part, count[part])
         other = one + 1 + np.arange(len(one)) - np.repeat(total - count[part], count[part])
-        one, other, its = box[order[one]], box[order[other]], strip[order[one]]
-        near = (low[one] <= high[other]).all(axis=1) & (low[other] <= high[one]).all(axis=1)
-        near &= its == np.maximum(first[one], first[other])  # of all strips that two share, the first
+        one, other, its = order[one], order[other], None
+        if box is not None:
+            one, other, its = box[one], box[other], strip[one]
+        near = (left[other] <= right[one]) & (lower[one] <= upper[other]) & (lower[other] <= upper[one])
+        if its is not None:
+            near &= its == np.maximum(first[one], first[other])  # of all strips that two share, the first
         yield one[near], other[near]
 
 

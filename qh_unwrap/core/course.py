@@ -171,9 +171,10 @@ class Course(Improvement):
             if new.any():
                 start = start.copy()
                 found = yield from best_start(surface if new.all() else surface.of(new), settings)
-                start[batch.rows(new)], known, crossing = found
+                start[batch.rows(new)] = found.uv
                 certified = np.zeros(p, bool)
-                certified[new], directly[new] = known, ~crossing
+                certified[new], directly[new] = found.certified, ~found.crossing
+                self.sure[new] = found.in_square & ~batch.in_frame(settings)[new]
         elif settings.initial != "CURRENT":
             start = natural_start(surface, settings, settings.initial)
         if batch.has_pins.any():
@@ -358,7 +359,8 @@ class Course(Improvement):
         if late.any():
             start = self.best.copy()
             if self.settings.initial == "AUTO":
-                start[batch.rows(late)], *_ = yield from best_start(batch.surface.of(late), self.settings)
+                found = yield from best_start(batch.surface.of(late), self.settings)
+                start[batch.rows(late)] = found.uv
             self._put_pins(start, late)
             yield from self._in_air(late, start)
         if not arrived.any():

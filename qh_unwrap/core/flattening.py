@@ -9,7 +9,7 @@ from .certificate import are_crossed, crossing_sides
 from .chart import Surface
 from .domain import Fixed, Held
 from .loops import followers
-from .pieces import starts_of
+from .pieces import parts_of, starts_of
 from .weights import cotangent
 
 _ROUNDEST = 0.5  # share of a circle's bends that outlines take on at most not to cross themselves,
@@ -123,7 +123,7 @@ class _Outlines:
         return self._crossed(np.zeros(len(self._bend)), np.ones(len(self._starts), bool))
 
     def _polygons(self, share):
-        return np.split(self.at(share), self._starts[1:])
+        return parts_of(self.at(share), self._starts)
 
     def _crossed(self, share, asked):
         """Which of the pieces that are `asked` for cross themselves with such shares, (p,) bool."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -113,14 +114,26 @@ class _Candidates:
         return natural_start(part, self._settings, "PROJECTION" if initial == "SHADOW" else initial)
 
 
-def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+class Start(NamedTuple):
+    """A map to begin with."""
+
+    uv: np.ndarray
+    """(n, 2)"""
+    certified: np.ndarray
+    """(p,) bool, the pieces for which it is certified,"""
+    in_square: np.ndarray
+    """and those of them for which it is so in the unit square"""
+    crossing: np.ndarray
+    """(p,) bool, the pieces that would cross themselves on the way if nothing kept them from it"""
+
+
+def best_start(surface: Surface, settings: Settings) -> Generator[str, None, Start]:
     """Of the certified natural maps of every piece a good one, or that of least energy; of all, if none is certified.
 
-    Returns the map (n, 2), for which pieces (p,) it is certified, and which (p,) would cross themselves on the way if
-    nothing kept them from it; yields `PART` now and then.
+    Yields `PART` now and then.
     """
     start, least = np.zeros((len(surface.vertices), 2)), np.full(surface.piece_count, np.inf)
-    certified, undecided = np.zeros(surface.piece_count, bool), np.ones(surface.piece_count, bool)
+    certified, in_square, undecided = (np.full(surface.piece_count, value) for value in (False, False, True))
     untried, candidates = undecided.copy(), _Candidates(surface, settings)
     for initial, enough in _CANDIDATES.items():
         trying = candidates.suited(initial, undecided)
@@ -139,25 +152,27 @@ def best_start(surface: Surface, settings: Settings) -> Generator[str, None, tup
         promising = (value < least[pieces]) | ~certified[pieces]
         if initial == "OPENED":  # else it leads nowhere good
             promising &= value < enough
-        sure = promising
+        sure = square = promising
         if promising.any():
-            # In the unit square it must be certified in the end, and elsewhere rounding is another.  But in maps that
-            # are to stay cuts are closed, and their sides may well lie on each other there.
-            staying = (value <= ISOMETRIC)[part.vertex_piece, None]
-            sure = promising & certified_pieces(part, np.where(staying, uv, part.in_unit_square(uv)))
+            # In the unit square it must be certified in the end.  But in maps that are to stay cuts are closed, and
+            # their sides may well lie on each other there: rounding is another elsewhere.
+            sure = square = promising & certified_pieces(part, part.in_unit_square(uv))
+            closed = promising & ~square & (value <= ISOMETRIC)
+            if closed.any():
+                sure = square | (closed & certified_pieces(part, uv))
         if initial == "CONFORMAL":
             candidates.crossing[pieces] = promising & ~sure & (value < enough)
         better = np.where(sure == certified[pieces], value < least[pieces], sure)
         better |= untried[pieces]
         untried &= ~trying
         taken = pieces[better]
-        least[taken], certified[taken] = value[better], sure[better]
+        least[taken], certified[taken], in_square[taken] = value[better], sure[better], square[better]
         its = better[part.vertex_piece]
         start[np.flatnonzero(trying[surface.vertex_piece])[its]] = uv[its]
         undecided &= ~(certified & (least < enough))
         if not undecided.any():
             break
-    return start, certified, candidates.crossing
+    return Start(start, certified, in_square, candidates.crossing)
 
 
 def with_pins(surface: Surface, start: np.ndarray, uv: np.ndarray, pinned: np.ndarray) -> np.ndarray:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The UVs that a mesh's islands have before they get new ones, worked out for all of them at once."""
+"""A mesh's islands, and what there is to know of them before they are unwrapped, worked out for all at once."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -15,15 +15,16 @@ _NO_NUMBERS, _IN_ONE_PLACE = "some of its UVs are no numbers", "all its UVs are 
 _TOLERANCE = 1e-5  # of an island's extent, by which the UVs of a vertex may differ and yet be meant to be one
 
 
-class OldMaps:
-    """What there is to know of the islands' old UVs, which have the proportions of their images.
+class MeshIslands:
+    """What there is to know of a mesh's islands, their shapes and their old UVs.
 
     Parameters
     ----------
     mesh : MeshArrays
     islands : of this mesh
 
-    Lists and arrays have an item for each island.  But for `aspects`, they are only there where the mesh has UVs.
+    Lists and arrays have an item for each island.  Old UVs are only there where the mesh has some; they have the
+    proportions of the islands' images.
     """
 
     def __init__(self, mesh: MeshArrays, islands: Sequence[Island]):
@@ -40,6 +41,18 @@ class OldMaps:
                 values, counts = np.unique(self._mesh.aspect[island.faces], return_counts=True)
                 own[0] = values[np.argmax(counts)]
         return result
+
+    @cached_property
+    def vertices(self) -> list[np.ndarray]:
+        """Where the islands' vertices are in space, (n, 3) each."""
+        return parts_of(self._mesh.vertices[np.concatenate([its.vertices for its in self._islands])], self._starts)
+
+    @cached_property
+    def triangle_faces(self) -> list[np.ndarray]:
+        """The face of the mesh that each triangle is a part of, (t,) each."""
+        return parts_of(self._mesh.corner_faces[self._triangle_corners[:, 0]], self._triangle_starts)
+
+    # The old UVs
 
     @cached_property
     def uvs(self) -> list[np.ndarray]:
@@ -85,7 +98,7 @@ class OldMaps:
 
     @cached_property
     def triangles(self) -> list[np.ndarray]:
-        """The islands' triangles, (t, 3, 2) each."""
+        """Those of the islands' triangles, (t, 3, 2) each."""
         return parts_of(self._triangles, self._triangle_starts)
 
     @cached_property
@@ -107,6 +120,10 @@ class OldMaps:
     @cached_property
     def _triangle_starts(self):
         return starts_of([island.triangles for island in self._islands])
+
+    @cached_property
+    def _triangle_corners(self):
+        return np.concatenate([island.triangle_corners for island in self._islands])
 
     @cached_property
     def _corner_counts(self):
@@ -145,5 +162,5 @@ class OldMaps:
 
     @cached_property
     def _triangles(self):
-        corners = np.concatenate([island.triangle_corners for island in self._islands])
+        corners = self._triangle_corners
         return self._mesh.uv[corners] * self.aspects[numbers(self._triangle_starts, len(corners)), None]
