@@ -25,7 +25,9 @@ from .untangling import untangled
 
 PINS_CROSS = "the pins make the outline cross itself: unpin some, or move them"
 PINS_FLIP = "no map without flips was found with these pins: unpin some, or move them"
-_NEAR = 2.5  # the energy of a start from which the refinement alone soon arrives
+_NEAR = 3.5  # the energy of a start from which the refinement alone soon arrives,
+_SMALL_NEAR = 200.0  # and in a piece with few triangles and no long outline: some steps more take less time than air
+_FEW = 5000  # triangles
 _BY_ANGLES = 0.5  # the balance above which conformal maps are nearer to the best than rigid triangles lead
 _LONG = 1.5  # the squared outline from which on it may well cross itself, relative to that of a disk of the same area
 _IN_AIR = 5000  # vertices of the pieces that are improved together with air around them
@@ -198,9 +200,10 @@ class Course(Improvement):
             yield STEP
             return
         near = done = rigidly = np.zeros(p, bool)
+        value, winding = energies(surface, start, settings.balance), surface.outline_lengths**2 > _LONG * 4 * np.pi
         if self.refining:
-            value = energies(surface, start, settings.balance)
-            soon = value < _NEAR
+            small = ~winding & (np.bincount(surface.piece, minlength=p) <= _FEW)
+            soon = value < np.where(small, _SMALL_NEAR, _NEAR)
             if soon.any():
                 certified = certified_pieces(surface, start) if certified is None else certified
                 done = certified & (value <= ISOMETRIC) & ~batch.apart(start)
@@ -211,7 +214,6 @@ class Course(Improvement):
         if (done | near).any():
             yield STEP
         if near.any():
-            winding = surface.outline_lengths**2 > _LONG * 4 * np.pi
             group = self._group(near, start, loose)
             yield from self.refine(group, watched=bool((winding & near).any()), rigidly=bool((rigidly & near).any()))
             part = surface if near.all() else surface.of(near)
@@ -229,7 +231,7 @@ class Course(Improvement):
                     self.changes[k] = []
         far = ~(done | near)
         if far.any():
-            yield from self._in_air(far, start.copy(), rigidly=far & rigidly)
+            yield from self._in_air(far, start.copy(), rigidly=far & rigidly & (value < _NEAR))
 
     def _in_air(
         self, pieces: np.ndarray, start: np.ndarray, following: bool = False, rigidly: np.ndarray | None = None

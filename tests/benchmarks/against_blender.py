@@ -7,8 +7,8 @@ of QH_MESHES are added to the generated ones.  Figures are also written to the f
     python -m tests.benchmarks.against_blender [--part PART] [--largest 30000] [--seconds 3]
 
 The parts are `quality`, `time`, `growth`, `islands`, `slider` and `scans`, and those of `assets`: `charts`, `models`,
-`quads` and `assets`.  `quality` takes some fifteen minutes and `time` half an hour, nearly all of it Minimum Stretch at
-200 000 triangles.
+`quads`, `assets` and `again`.  `quality` takes some fifteen minutes and `time` half an hour, nearly all of it Minimum
+Stretch at 200 000 triangles.
 """
 
 import argparse

@@ -48,10 +48,10 @@ def quads(arguments, verdicts):
     return beside({name: Polygons.alike(*grid) for name, grid in grids.items()}, arguments, verdicts)
 
 
-def many_sheets(arguments, verdicts):
+def many_sheets(arguments, verdicts, again=False):
     """Assets of many islands, sheets of triangles, each curled and bumpy in its own way."""
     assets = {f"{count} x {2 * across**2} triangles": asset(count, across) for count, across in SHEETS.items()}
-    found = beside(assets, arguments, verdicts)
+    found = beside(assets, arguments, verdicts, again)
     for row in found:
         ours, native = row[OURS]["seconds"], row[STRETCH_10]["seconds"]
         text = f"{row['mesh']}: at least as fast as {STRETCH_10}"
@@ -59,7 +59,12 @@ def many_sheets(arguments, verdicts):
     return found
 
 
-PARTS = {"charts": charts, "models": models, "quads": quads, "assets": many_sheets}
+def unwrapped_before(arguments, verdicts):
+    """The same assets with the UVs that the same method gave them before."""
+    return many_sheets(arguments, verdicts, again=True)
+
+
+PARTS = {"charts": charts, "models": models, "quads": quads, "assets": many_sheets, "again": unwrapped_before}
 
 
 def is_closed(mesh):
@@ -92,14 +97,14 @@ def sheet(random, across):
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), plane[:, 1]]), faces
 
 
-def beside(meshes, arguments, verdicts):
+def beside(meshes, arguments, verdicts, again=False):
     """Print and return a row for every mesh, `Polygons`, by name: time and islands of ours and Minimum Stretch 10."""
     found = []
     for name, mesh in meshes.items():
         if mesh.triangle_count <= arguments.largest:
             if not found:
                 print_row(HEADER)
-            found.append(compared(name, mesh, arguments.seconds))
+            found.append(compared(name, mesh, arguments.seconds, again))
             print_row(texts(found[-1]))
     if found:
         print()
@@ -108,12 +113,12 @@ def beside(meshes, arguments, verdicts):
     return found
 
 
-def compared(name, mesh, seconds):
+def compared(name, mesh, seconds, again=False):
     """What both methods make of a mesh: time, the median of several runs, and measures of the islands of the last."""
     triangles = loop_triangles(mesh)
     row = {"mesh": name, "triangles": len(triangles)}
     energies = []
-    for method, runs in in_turns(mesh, (OURS, STRETCH_10), seconds).items():
+    for method, runs in in_turns(mesh, (OURS, STRETCH_10), seconds, again=again).items():
         uv = runs[-1][1]
         islands = islands_of(mesh, triangles, np.zeros((len(mesh.corners), 2)) if uv is None else uv)
         found = judged_islands(islands)

@@ -38,21 +38,22 @@ def extension():
         qh_unwrap.unregister()
 
 
-def unwrapped(mesh, method=OURS, around=nullcontext(), **settings):  # noqa: B008 (it keeps no state)
+def unwrapped(mesh, method=OURS, around=nullcontext(), again=False, **settings):  # noqa: B008 (it keeps no state)
     """Seconds that a method, ours with these settings, takes on the mesh, and the UVs as stored.
 
     A mesh of vertices (n, 3) and triangles (m, 3) has the UVs (n, 2) of its vertices, `Polygons` those of its corners.
-    The UVs are None if the operator fails.  The context manager `around` is entered for the call alone.
+    The UVs are None if the operator fails.  The context manager `around` is entered for the call alone.  If `again`,
+    the mesh already has the UVs of an earlier call.
     """
     polygons = mesh if isinstance(mesh, Polygons) else Polygons.alike(*mesh)
     data = _in_edit_mode(polygons)
+    if again:
+        with _silence():
+            _call(method, settings)
     begun = time.perf_counter()
     try:
         with _silence(), around:
-            if method == OURS:
-                bpy.ops.uv.qh_unwrap(**settings)
-            else:
-                bpy.ops.uv.unwrap(**NATIVE[method], fill_holes=True, correct_aspect=False, margin=0)
+            _call(method, settings)
     except RuntimeError as error:
         print(f"{method}: {error}")
         return time.perf_counter() - begun, None
@@ -68,14 +69,22 @@ def unwrapped(mesh, method=OURS, around=nullcontext(), **settings):  # noqa: B00
     return seconds, uv
 
 
-def in_turns(mesh, methods, seconds, most=9):
-    """For each method its runs, (seconds, UVs), in turns: as many as take about so long, three if one takes less."""
+def _call(method, settings):
+    if method == OURS:
+        bpy.ops.uv.qh_unwrap(**settings)
+    else:
+        bpy.ops.uv.unwrap(**NATIVE[method], fill_holes=True, correct_aspect=False, margin=0)
+
+
+def in_turns(mesh, methods, seconds, most=9, again=False):
+    """For each method its runs, (seconds, UVs), in turns: as many as take about so long, three if one takes less.  If
+    `again`, of meshes that have UVs already."""
     runs = {method: [] for method in methods}
     for _ in range(most):
         for method, done in runs.items():
             longest = max((each for each, _ in done), default=0)
             if not done or (longest < seconds and (len(done) < 3 or (len(done) + 1) * longest < seconds)):
-                done.append(unwrapped(mesh, method))
+                done.append(unwrapped(mesh, method, again=again))
     return runs
 
 
