@@ -158,6 +158,20 @@ def test_where_a_step_has_kept_its_promise_its_equations_do_for_the_last(seed, m
     assert found == pytest.approx(best, rel=2e-5)
 
 
+def test_small_bulges_need_no_air():
+    """They end where air would have led them, and free of overlaps."""
+    vertices, triangles = shapes.hemisphere(10, 3)
+
+    def no_air(*_):
+        raise AssertionError("air was made")
+
+    result = unwrap(vertices, triangles, triangulate=no_air)
+    assert result.report.initial.symmetric_dirichlet > 10
+    assert result.report.injective
+    again = unwrap(vertices, triangles, Settings(initial="CURRENT"), result.uv)
+    assert again.report.after.symmetric_dirichlet > (1 - 5e-4) * result.report.after.symmetric_dirichlet
+
+
 def test_steps_lower_the_energy_and_flip_nothing():
     vertices, triangles = shapes.bump(4, inner=300, outer=50, height=2)
     surface = Surface(vertices, triangles)

@@ -142,3 +142,22 @@ def test_indices_of_32_bits_do_not_overflow():
     ):
         np.testing.assert_array_equal(found, expected)
     np.testing.assert_array_equal(numbered_edges(triangles.astype(np.int32), n)[0], one.edges)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_loops_are_walked_around_from_their_smallest_vertices(seed):
+    """Of several pieces with holes, whatever the vertices' numbers are."""
+    rng = np.random.default_rng(seed)
+    vertices, triangles = shapes.grid(24, 18)
+    row, column = np.divmod(np.tile(np.arange(24 * 18), 2), 24)  # of every triangle's quad
+    kept = column != 12  # two pieces
+    for left, below in ((4, 4), (17, 9)):
+        kept &= (np.abs(column - left) > 2) | (np.abs(row - below) > 2)
+    number = rng.permutation(len(vertices))
+    triangles = number[triangles[kept]][rng.permutation(kept.sum())]
+    topology = Topology(triangles, len(vertices))
+    start, end = (each[topology.on_boundary].tolist() for each in topology.half_edges)
+    found = [list(zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)) for loop in topology.loops]
+    assert len(found) == 4
+    assert sorted(side for loop in found for side in loop) == sorted(zip(start, end, strict=True))
+    assert [loop[0] for loop in topology.loops] == sorted(loop.min() for loop in topology.loops)
