@@ -15,7 +15,7 @@ _SLACK = 1e-5  # of the square, by which islands may reach over its border
 
 def place(works, all_works, options, context):
     works = [work for work in works if not work.in_frame]
-    old, new = ([work for work in works if work.has_place is has_place] for has_place in (True, False))
+    old, new = ([work for work in works if work.has_place == has_place] for has_place in (True, False))
     for work in works:
         work.mirrored = work.has_place and work.was_mirrored
         if work.mirrored:

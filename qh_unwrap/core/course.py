@@ -215,7 +215,7 @@ class Course(Improvement):
             yield STEP
         if near.any():
             group = self._group(near, start, loose)
-            yield from self.refine(group, watched=bool((winding & near).any()), rigidly=bool((rigidly & near).any()))
+            yield from self.refine(group, watched=winding[near], rigidly=bool((rigidly & near).any()))
             part = surface if near.all() else surface.of(near)
             certain = np.zeros(p, bool)
             certain[near] = certified_pieces(part, self.placed(self.best[batch.rows(near)], near, part))

@@ -195,10 +195,11 @@ class Improvement:
         if sound.any():
             yield from self.refine(group.of(sound))
 
-    def refine(self, group: Group, watched: bool = False, rigidly: bool = False) -> Steps:
+    def refine(self, group: Group, watched: np.ndarray | None = None, rigidly: bool = False) -> Steps:
         """Newton's steps, in every piece as long as they pay; `rigidly` with one before them that lays triangles out.
 
-        Pieces that are `watched` stop where their outlines come to cross themselves in the first step, as most that do.
+        Pieces that are `watched`, (p',) bool, stop where their outlines come to cross themselves in the first step, as
+        most that do.
         """
         settings = self.settings
         yield PART
@@ -224,8 +225,8 @@ class Improvement:
             self.sure[group.pieces[fine]] = False
             self.converged[group.pieces[fine]] = done[fine]
             going &= ~done
-            if watched and number == 0 and going.any():
-                going &= certified_pieces(island, group.island_uv)
+            if number == 0 and watched is not None and (watched & going).any():
+                going &= ~watched | certified_pieces(island, group.island_uv)
             yield STEP
             if not going.any():
                 return
