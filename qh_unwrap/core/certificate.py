@@ -229,22 +229,23 @@ def near_boxes(low: np.ndarray, high: np.ndarray, group: np.ndarray) -> Iterator
     """
     axis = int(np.argmax(np.ptp(low, axis=0)))
     (left, lower), (right, upper) = ((each[:, axis], each[:, 1 - axis]) for each in (low, high))
-    box = strip = first = None
     order, count = _swept(left, right, group)
+    cut = None
     if count.sum() > _CROWDED * len(left):
-        box, strip, first = _strips(lower, upper, _MOST // (group.max() + 1))
+        box, strip, _ = cut = _strips(lower, upper, _MOST // (group.max() + 1))
         group = group[box] * (strip.max() + 1) + strip
         order, count = _swept(left[box], right[box], group)
     for part in np.array_split(np.arange(len(order)), 1 + count.sum() // _PORTION):
         total = np.cumsum(count[part])
         one = np.repeat(part, count[part])
         other = one + 1 + np.arange(len(one)) - np.repeat(total - count[part], count[part])
-        one, other, its = order[one], order[other], None
-        if box is not None:
-            one, other, its = box[one], box[other], strip[one]
-        near = (left[other] <= right[one]) & (lower[one] <= upper[other]) & (lower[other] <= upper[one])
-        if its is not None:
-            near &= its == np.maximum(first[one], first[other])  # of all strips that two share, the first
+        one, other = order[one], order[other]
+        own = np.ones(len(one), bool)
+        if cut is not None:
+            box, strip, first = cut
+            its, one, other = strip[one], box[one], box[other]
+            own = its == np.maximum(first[one], first[other])  # of all strips that two share, the first
+        near = own & (left[other] <= right[one]) & (lower[one] <= upper[other]) & (lower[other] <= upper[one])
         yield one[near], other[near]
 
 
