@@ -8,7 +8,7 @@ import numpy as np
 from ..core import UnwrapError, placing
 from ..core.triangles import areas_in_space
 from . import packing, texels
-from .work import maps, old_triangles, put_maps, surfaces
+from .work import maps, put_maps, surfaces
 
 _SLACK = 1e-5  # of the square, by which islands may reach over its border
 
@@ -24,7 +24,8 @@ def place(works, all_works, options, context):
             work.uv = placing.in_unit_square(work.uv / work.aspect) * work.aspect
     if old and options.placement != 'UNIT':
         islands = surfaces(old)
-        put_maps(old, islands.of_each(placing.in_place(islands, maps(old), old_triangles(old))))
+        onto = np.concatenate([work.old_triangles for work in old])
+        put_maps(old, islands.of_each(placing.in_place(islands, maps(old), onto)))
     texels.choose_scales(works, options, context)
     if options.placement != 'PACK':
         resize(works if options.placement == 'UNIT' else old)

@@ -3,7 +3,7 @@
 
 from ..core.overlaps import new_overlaps
 from . import layout
-from .work import triangles_in_map
+from .work import triangles_in_image
 
 _NAMED = 5  # of those that an island lies on
 
@@ -32,7 +32,7 @@ def new_overlaps_of(works, all_works):
     others = list(layout.left_alone(all_works))
     if len(works) + len(others) < 2:
         return [[] for _ in works]
-    now = triangles_in_map(works)
+    now = triangles_in_image(works)
     before = [work.old_triangles / work.aspect if work.has_place else None for work in works]
     images = [work.image for work in works]
     for _, rest, image in others:

@@ -12,7 +12,6 @@ from ..core.islands import Island
 from ..core.pieces import Pieces, joined, parts_of, starts_of
 from ..core.regions import Connected
 from ..core.straightening import Straight
-from ..core.triangles import corners_of, signed_areas
 from . import mesh_arrays
 from .mesh_islands import MeshIslands
 from .outcome import Outcome
@@ -83,8 +82,7 @@ class Work:
 
     def as_before(self):
         """The same with the old UVs for new ones."""
-        mirrored = signed_areas(corners_of(self.old_uv, self.triangles)).sum() < 0
-        return replace(self, uv=self.old_uv, mirrored=bool(mirrored))
+        return replace(self, uv=self.old_uv, mirrored=self.was_mirrored)
 
     @property
     def has_place(self):
@@ -108,13 +106,11 @@ class Work:
         """(n, 3)"""
         return self.together.vertices[self.number]
 
-    @property
+    @cached_property
     def importance(self):
         """(t,) how many times as large each triangle shall be as one without weights, None if all shall be alike."""
-        return None if self.mesh.importance is None else self._importance
-
-    @cached_property
-    def _importance(self):
+        if self.mesh.importance is None:
+            return None
         return np.exp(self.mesh.importance[self.island.vertices][self.triangles].mean(axis=1))
 
     @property
@@ -225,16 +221,15 @@ def maps(works: Sequence[Work]) -> np.ndarray:
     return np.concatenate([work.uv for work in works])
 
 
-def old_triangles(works: Sequence[Work]) -> np.ndarray:
-    """The old UVs (t, 3, 2) of the works' triangles, one after another."""
-    return np.concatenate([work.old_triangles for work in works])
+def _in_image(works):
+    """The same in their images, which need not be square."""
+    return maps(works) / np.repeat([work.aspect for work in works], [len(work.uv) for work in works], axis=0)
 
 
-def triangles_in_map(works: Sequence[Work]) -> list[np.ndarray]:
-    """The new UVs (t, 3, 2) of each work's triangles, as they are stored."""
-    uv, triangles, starts, triangle_starts = joined([work.uv for work in works], [work.triangles for work in works])
-    uv = uv / np.repeat([work.aspect for work in works], np.diff(starts, append=len(uv)), axis=0)
-    return parts_of(uv[triangles], triangle_starts)
+def triangles_in_image(works: Sequence[Work]) -> list[np.ndarray]:
+    """The new UVs (t, 3, 2) of each work's triangles in its image."""
+    _, triangles, _, triangle_starts = joined([work.uv for work in works], [work.triangles for work in works])
+    return parts_of(_in_image(works)[triangles], triangle_starts)
 
 
 def put_maps(works: Sequence[Work], uvs: Sequence[np.ndarray]) -> None:
@@ -246,8 +241,7 @@ def put_maps(works: Sequence[Work], uvs: Sequence[np.ndarray]) -> None:
 def written_uv(works: Sequence[Work]) -> np.ndarray:
     """The works' new UVs (n, 2), one after another, as they are written; one that stayed stays to the last bit."""
     starts = starts_of([work.uv for work in works])
-    uv = maps(works)
-    uv = uv / np.repeat([work.aspect for work in works], np.diff(starts, append=len(uv)), axis=0)
+    uv = _in_image(works)
     for work, start in zip(works, starts.tolist(), strict=True):
         if work.in_frame:
             stayed, old = work.stayed

@@ -30,6 +30,22 @@ class Outlines(NamedTuple):
     first: np.ndarray
     """(k,), where each polygon begins."""
 
+    @classmethod
+    def of(cls, polygons: Polygons) -> Outlines:
+        """These polygons, which may have that form already."""
+        return polygons if isinstance(polygons, cls) else cls(np.concatenate(polygons), starts_of(polygons))
+
+    @property
+    def following(self) -> np.ndarray:
+        """(n,), the number of the side that follows each; sides are numbered by the points where they start."""
+        result = np.arange(1, len(self.points) + 1)
+        result[np.append(self.first[1:], len(self.points)) - 1] = self.first
+        return result
+
+    def at_sides(self, values: np.ndarray) -> np.ndarray:
+        """The polygons' values (k, ...) at their sides, (n, ...)."""
+        return np.repeat(values, np.diff(self.first, append=len(self.points)), axis=0)
+
 
 Polygons = Sequence[np.ndarray] | Outlines
 """Closed polygons, the points (n, 2) of each."""
@@ -148,21 +164,11 @@ def enclosed_area(points: np.ndarray) -> float:
 
 def enclosed_areas(polygons: Polygons) -> np.ndarray:
     """The same of every polygon, (k,)."""
-    start, following, first = _sides(polygons)
-    origin = np.repeat(start[first], np.diff(first, append=len(start)), axis=0)
-    (x, y), (next_x, next_y) = (start - origin).T, (start[following] - origin).T
+    outlines = Outlines.of(polygons)
+    points, first = outlines
+    local = points - outlines.at_sides(points[first])
+    (x, y), (next_x, next_y) = local.T, local[outlines.following].T
     return 0.5 * np.add.reduceat(x * next_y - y * next_x, first)
-
-
-def _sides(polygons):
-    """Where the sides of all closed polygons start, (n, 2), the number of the side that follows each, (n,), and that of
-    each polygon's first side, (k,)."""
-    if not isinstance(polygons, Outlines):
-        polygons = Outlines(np.concatenate(polygons), starts_of(polygons))
-    start, first = polygons
-    following = np.arange(1, len(start) + 1)
-    following[np.append(first[1:], len(start)) - 1] = first
-    return start, following, first
 
 
 def count_crossings(polygons: Polygons, touching: bool = False) -> int:
@@ -172,8 +178,9 @@ def count_crossings(polygons: Polygons, touching: bool = False) -> int:
 
 def crossings(polygons: Polygons, group: np.ndarray, touching: bool = False) -> np.ndarray:
     """The same for every group of polygons, (g,); `group` (k,) is the number of each polygon's group."""
-    found, of = np.zeros(group.max() + 1, int), _groups(polygons, group)
-    for sides in crossing_sides(polygons, group, touching):
+    outlines, found = Outlines.of(polygons), np.zeros(group.max() + 1, int)
+    of = outlines.at_sides(group)
+    for sides in crossing_sides(outlines, group, touching):
         found += np.bincount(of[sides[0]], minlength=len(found))
     return found
 
@@ -181,18 +188,14 @@ def crossings(polygons: Polygons, group: np.ndarray, touching: bool = False) -> 
 def are_crossed(polygons: Polygons, group: np.ndarray, known: np.ndarray | None = None) -> np.ndarray:
     """In which groups of polygons sides cross or touch, exactly, (g,) bool; `known` (g,) bool are some that count as
     such anyway."""
-    found, of = np.zeros(group.max() + 1, bool) if known is None else known.copy(), _groups(polygons, group)
-    for sides in crossing_sides(polygons, group, touching=True):
+    found = np.zeros(group.max() + 1, bool) if known is None else known.copy()
+    outlines = Outlines.of(polygons)
+    of = outlines.at_sides(group)
+    for sides in crossing_sides(outlines, group, touching=True):
         found[of[sides[0]]] = True
         if found.all():  # thousands of sides may lie one over the other
             break
     return found
-
-
-def _groups(polygons, group):
-    """The group of every side, (n,)."""
-    start, _, first = _sides(polygons)
-    return np.repeat(group, np.diff(first, append=len(start)))
 
 
 def crossing_sides(
@@ -200,9 +203,9 @@ def crossing_sides(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield the pairs of sides, of polygons of one group, that properly cross, or also touch, exactly, as two arrays of
     numbers (k,), some at a time.  Sides are numbered polygon after polygon."""
-    start, following, _ = _sides(polygons)
+    outlines = Outlines.of(polygons)
+    start, following, group = outlines.points, outlines.following, outlines.at_sides(group)
     end = start[following]
-    group = _groups(polygons, group)
     if touching:  # sides that run back over the one before
         back = end - start, end[following] - end
         on_a_line = turn(start, end, end[following]) == 0
