@@ -8,9 +8,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mckee
 from scipy.sparse.linalg import spilu
 
+from .bands import are_narrow
+from .patterns import places
+
 _LEAF = 16  # vertices: so few are not divided any further
-_FEW = 150  # vertices of the largest piece, up to which a band hardly fills in,
-_MANY = 25_000  # and beyond which dissection leaves less fill than minimum degree
+_MANY = 25_000  # vertices of the largest piece, beyond which dissection leaves less fill than minimum degree
 
 
 def elimination_order(points: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
@@ -32,10 +34,19 @@ def local_order(n: int, edges: np.ndarray, group: np.ndarray | None = None) -> n
     """The same for groups that are not large, which needs no points."""
     if not len(edges):
         return np.arange(n)
-    if _largest(n, group) <= _FEW:
-        return _banded(n, edges)
-    order = _by_minimum_degree(n, edges)
-    return order if group is None else order[np.argsort(group[order], kind="stable")]  # one after the other
+    near = _banded(n, edges)
+    if group is not None:
+        near = near[np.argsort(group[near], kind="stable")]  # one piece after the other
+    narrow = are_narrow(near, edges, group)
+    if narrow.all():
+        return near
+    near, wide = near[narrow[near]], near[~narrow[near]]
+    place = np.full(n, -1, np.int32)
+    place[wide] = np.arange(len(wide), dtype=np.int32)
+    order = wide[_by_minimum_degree(len(wide), place[edges[~narrow[edges[:, 0]]]])]
+    if group is not None:
+        order = order[np.argsort(group[order], kind="stable")]
+    return np.concatenate([near, order])
 
 
 def _banded(n, edges):
@@ -50,20 +61,16 @@ def _by_minimum_degree(n, edges):
     """The vertex with the fewest neighbours next, as SuperLU finds it; of its factors nothing else is wanted.
 
     Where many have as few, as on regular meshes, it takes them as they are numbered, and some numberings leave five
-    times the fill of others: so it is given neighbours one after another.
+    times the fill of others: neighbours should follow one another.
     """
-    near = _banded(n, edges)
-    number = np.empty(n, np.int32)
-    number[near] = own = np.arange(n, dtype=np.int32)
-    i, j = number[edges.T]
+    own = np.arange(n, dtype=np.int32)
+    i, j = edges.T
     row, column = np.concatenate([i, j, own]), np.concatenate([j, i, own])
     values = np.zeros(len(row), np.float32)
     values[-n:] = 1
     matrix = coo_array((values, (row, column)), shape=(n, n)).tocsc()
     factors = spilu(matrix, drop_tol=1.0, fill_factor=1, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    order = np.empty(n, np.int64)
-    order[factors.perm_c] = near
-    return order
+    return places(factors.perm_c)
 
 
 def _largest(n, group):

@@ -7,143 +7,45 @@ The pattern of the matrices is found once; every new set of weights is only put 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
-from scipy.sparse import bsr_array, coo_array, csc_array
 
-from .factors import Factorizer, Factors, superlu
-from .triangles import parts
-
-_STEPS = 100  # of conjugate gradients, at most
-# Of one piece; islands that go together with others have fewer unknowns.
-_LARGE = 30_000  # unknowns, from which on single precision pays, and old factors are tried first
-_PATIENCE = 7  # steps of conjugate gradients that an old factorization may take
+from .bands import Banded, are_narrow
+from .errors import SingularError
+from .factors import Factorizer, superlu
+from .patterns import Unknowns
+from .sparse import Sparse
 
 
-class Unknowns:
-    """The unknowns of one coordinate, numbered in the order in which they are eliminated.
+class Equations(Protocol):
+    """Equations for some of the vertices' coordinates, all others of which stay."""
 
-    Parameters
-    ----------
-    order : (n,), the vertices in that order
-    held : (n,) bool, vertices whose coordinate is no unknown
-    partner : (n,), for every vertex the one that it moves together with, itself if with none; None for nobody
-    """
+    def newton_direction(
+        self,
+        gradient: np.ndarray,
+        beside: Sequence[np.ndarray],
+        own: Sequence[np.ndarray],
+        residual: np.ndarray | float,
+    ) -> np.ndarray:
+        """As that of `Constrained`."""
+        ...
 
-    def __init__(self, order: np.ndarray, held: np.ndarray, partner: np.ndarray | None = None):
-        self.tied = partner is not None and bool((partner != np.arange(len(order))).any())
-        if self.tied:
-            leader = _leaders(partner)
-            stuck = np.bincount(leader, held, len(order)) > 0  # who is tied to a held vertex is held as well
-            held = held | stuck[leader]
-            leads = leader == np.arange(len(order))
-        else:
-            leader, leads = np.arange(len(order)), True
-        self.held = held
-        self.sequence = order[(~held & leads)[order]]
-        self.number = np.full(len(order), -1)
-        self.number[self.sequence] = np.arange(len(self.sequence))
-        self.number = self.number[leader]
-        self.leader = leader
+    def next_direction(self, gradient: np.ndarray, residual: np.ndarray | float) -> np.ndarray:
+        """As that of `Constrained`."""
+        ...
 
-    def __len__(self):
-        return len(self.sequence)
+    def solver(
+        self, forward: np.ndarray, backward: np.ndarray, own: np.ndarray, exactly: bool
+    ) -> Callable[[np.ndarray, np.ndarray], None]:
+        """Solves each coordinate's equations by themselves; the matrix has the entries (i, j) and (j, i), (k,) each,
+        for the edges, and (i, i), (n,), for the vertices.
 
-    def gathered(self, values: np.ndarray) -> np.ndarray:
-        """Values (n, ...) at the vertices, added up for every unknown."""
-        if not self.tied:
-            return values[self.sequence]
-        result = np.zeros((len(self), *values.shape[1:]))
-        free = ~self.held
-        np.add.at(result, self.number[free], values[free])
-        return result
-
-    def spread(self, values: np.ndarray, out: np.ndarray) -> None:
-        """Add the unknowns' values to those (n, ...) of their vertices."""
-        if not self.tied:
-            out[self.sequence] += values
-        else:
-            free = ~self.held
-            out[free] += values[self.number[free]]
-
-
-def _leaders(partner):
-    """The first vertex of every set of vertices that are tied to one another, (n,)."""
-    leader = np.minimum(partner, np.arange(len(partner)))
-    while True:
-        smaller = leader.copy()
-        np.minimum.at(smaller, partner, leader)
-        smaller = np.minimum(smaller, smaller[partner])
-        smaller = smaller[smaller]
-        if (smaller == leader).all():
-            return leader
-        leader = smaller
-
-
-class Pattern:
-    """Where the entries of matrices on one graph go.
-
-    A matrix is given by its entries (i, j), (j, i) for the edges, (k,) each, and (i, i) for the vertices, (n,).
-    """
-
-    def __init__(self, unknowns: Unknowns, edges: np.ndarray):
-        self.size = size = len(unknowns)
-        k = len(edges)
-        i, j = unknowns.number[edges.T]
-        inner = np.flatnonzero((i >= 0) & (j >= 0))
-        free = np.flatnonzero(unknowns.number >= 0)
-        i, j, own = i[inner], j[inner], unknowns.number[free]
-        entry = np.concatenate([inner, k + inner, 2 * k + free])
-        row, column = np.concatenate([i, j, own]), np.concatenate([j, i, own])
-        self._slot = None
-        if unknowns.tied:  # several entries may fall into one place
-            key, self._slot = np.unique(column * np.int64(size) + row, return_inverse=True)
-            self._entry = entry
-            self.indices = (key % max(size, 1)).astype(np.int32)
-            count = np.bincount(key // max(size, 1), minlength=size)
-            self.indptr = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
-        else:
-            where = row.astype(np.int32), column.astype(np.int32)
-            pattern = coo_array((entry, where), shape=(size, size)).tocsc()
-            self._entry, self.indices, self.indptr = pattern.data, pattern.indices, pattern.indptr
-        nothing = np.empty(len(self.indices))
-        self._places: tuple[np.ndarray, np.ndarray] | None = None  # of entries in blocks, and which are to be turned
-        self._empty = csc_array((nothing, self.indices, self.indptr), shape=(self.size, self.size))
-
-    def matrix(self, forward: np.ndarray, backward: np.ndarray, diagonal: np.ndarray) -> csc_array:
-        entries = np.concatenate([forward, backward, diagonal])[self._entry]
-        if self._slot is not None:
-            entries = np.bincount(self._slot, entries, len(self.indices))
-        matrix = copy(self._empty)  # checked once
-        matrix.data = entries
-        return matrix
-
-    def block_matrix(
-        self, beside: Sequence[np.ndarray], own: Sequence[np.ndarray], earlier: bsr_array | None = None
-    ) -> bsr_array:
-        """The symmetric matrix of 2 by 2 blocks [[m + d, s - a], [s + a, m - d]], where no vertices are tied.
-
-        `beside` is (m, d, s, a), (k,) each, of the blocks (i, j), and `own` (m, d, s), (n,) each, of the blocks (i, i),
-        which are symmetric.  An `earlier` matrix is overwritten: fresh memory takes longer.
+        Returns a function of right-hand sides (n, c) and values (n, c), to which it adds the solution: as exactly as
+        positions need it, or as the factors have it.
         """
-        k = len(beside[0])
-        rows = [np.concatenate(both) for both in zip(beside, (*own, np.zeros(len(own[0]))), strict=True)]
-        if earlier is None:
-            blocks, shape = np.empty((len(self._entry), 2, 2)), (2 * self.size, 2 * self.size)
-            earlier = bsr_array((blocks, self.indices, self.indptr), shape=shape)
-        blocks = earlier.data
-        if self._places is None:
-            ahead = self._entry < k
-            self._places = np.where(ahead, self._entry, self._entry - k), ahead
-        for part in parts(len(self._entry)):
-            place, ahead, block = *(each[part] for each in self._places), blocks[part]
-            m, d, s, a = (row[place] for row in rows)
-            # The pattern is by columns, and what stands there is taken for rows: transpose.
-            np.negative(a, out=a, where=ahead)
-            block[:, 0, 0], block[:, 1, 1] = m + d, m - d
-            block[:, 0, 1], block[:, 1, 0] = s - a, s + a
-        return earlier
+        ...
 
 
 class Constrained:
@@ -176,16 +78,12 @@ class Constrained:
         self.edges = edges
         self.unknowns = [Unknowns(order, *one) for one in list(zip(held.T, partners, strict=True))[: 1 if alike else 2]]
         self.alike = len(self.unknowns) == 1
-        self.patterns = [Pattern(unknowns, edges) for unknowns in self.unknowns]
         self.held = np.column_stack([self.unknowns[0].held, self.unknowns[-1].held])
         self.values = values
         self.order, self._factorizer = order, factorizer
         self._group = None if group is None or not len(group) or (group == group[0]).all() else group
-        self._mean: list[Factors] | None = None  # those of the last equations,
-        self._serves_on = False  # and whether they may do for the next,
-        self._product: Callable[[np.ndarray], np.ndarray] | None = None  # and their Hessian
-        self._matrix: bsr_array | None = None
-        self._all: Pattern | None = None
+        self._partners = partners
+        self._last: list[Equations] = []  # whose Hessian is known
 
     def refixed(self, held: np.ndarray, values: np.ndarray, partner: np.ndarray | None = None) -> Constrained:
         """The same with other things held: with the same pattern and factors, if only the values differ."""
@@ -194,9 +92,32 @@ class Constrained:
             return self
         return Constrained(self.order, self.edges, held, values, partner, self._group, self._factorizer)
 
-    def _is_alone(self, size):
-        """Whether there is one piece only, of that many unknowns: what suits large ones must not depend on company."""
-        return self._group is None and self.patterns[0].size >= size
+    @cached_property
+    def _equations(self) -> list[Equations]:
+        """Those of all pieces whose matrices are symmetric and positive definite; what suits each depends on it alone,
+        and not on its company."""
+        narrow = are_narrow(self.order, self.edges, self._group)
+        found: list[Equations] = []
+        if narrow.any():
+            found.append(Banded(self._unknowns_of(narrow), self.order, self.edges, self._group))
+        if not narrow.all():
+            found.append(self._everything if not narrow.any() else self._sparse(~narrow))
+        return found
+
+    @cached_property
+    def _everything(self) -> Sparse:
+        """Those of all pieces, whatever their matrices are."""
+        return self._sparse(np.ones(len(self.order), bool))
+
+    def _sparse(self, chosen):
+        return Sparse(self._unknowns_of(chosen), self.order, self.edges, self._group, self._factorizer)
+
+    def _unknowns_of(self, chosen):
+        """The unknowns at the chosen vertices (n,) bool, those of whole pieces."""
+        if chosen.all():
+            return self.unknowns
+        each = zip(self.unknowns, self._partners, strict=False)
+        return [Unknowns(self.order, unknowns.held | ~chosen, partner) for unknowns, partner in each]
 
     @property
     def fixed(self) -> np.ndarray:
@@ -225,12 +146,7 @@ class Constrained:
         i, j = self.edges.T
         n = len(self.order)
         diagonal = self.diagonal(weights)
-        solvers = [
-            self._factorizer(pattern.matrix(-weights[0], -weights[1], diagonal), self._is_alone(_LARGE))
-            if pattern.size
-            else None
-            for pattern in self.patterns
-        ]
+        solvers = self._solvers(-weights[0], -weights[1], diagonal, True)
         tied = any(unknowns.tied for unknowns in self.unknowns)
 
         def result(fixed, sources=0.0):
@@ -241,13 +157,19 @@ class Constrained:
                 flux -= diagonal[:, None] * fixed
             flux = flux + sources
             values = fixed.copy()
-            each = [slice(None)] if self.alike else [slice(0, 1), slice(1, 2)]
-            for columns, unknowns, factors in zip(each, self.unknowns, solvers, strict=True):
-                if factors is not None:
-                    unknowns.spread(factors.solve_exactly(unknowns.gathered(flux[:, columns])), values[:, columns])
+            for solve in solvers:
+                solve(flux, values)
             return values
 
         return result
+
+    def _solvers(self, forward, backward, own, exactly):
+        if np.array_equal(forward, backward):
+            try:
+                return [each.solver(forward, backward, own, exactly) for each in self._equations]
+            except SingularError:  # or not positive definite, as where weights are negative
+                pass
+        return [self._everything.solver(forward, backward, own, exactly)]
 
     def newton_direction(
         self,
@@ -257,150 +179,29 @@ class Constrained:
         residual: np.ndarray | float,
     ) -> np.ndarray:
         """The direction (n, 2) of Newton's step, 0 where held, for a `gradient` (n, 2) and a positive definite Hessian
-        of blocks as `Pattern.block_matrix` takes them, up to a `residual` relative to the gradient in every piece: one
-        number, or (p,).
-
-        By conjugate gradients, with both coordinates' own matrices as preconditioner: their mean, where the same
-        vertices are free in both.
+        of blocks as `Pattern.block_matrix` takes them, at most a `residual` away, relative to the gradient in every
+        piece: one number, or (p,).
         """
-        direction = np.zeros(gradient.shape)
         if self.held.all():
-            return direction
-        hessian = self._product = self._hessian(beside, own)
-        rhs = self._downhill(gradient)
-        solution, missed = np.zeros_like(rhs), True
-        tried = self._serves_on
-        if tried:
-            solution, missed = self._conjugate_gradients(hessian, rhs, solution, residual, _PATIENCE)
-        if missed:
-            self._mean = None  # before there is another: both would take twice the memory
-            self._mean = [self._preconditioner(c, beside, own) for c in range(len(self.unknowns))]
-            solution, missed = self._conjugate_gradients(hessian, rhs, solution, residual, _STEPS)
-            sharper = [factors.sharpened() for factors in self._mean] if missed else []
-            if any(sharper):
-                solution, _ = self._conjugate_gradients(hessian, rhs, np.zeros_like(rhs), residual, _STEPS)
-            self._serves_on = self._is_alone(_LARGE) and not tried
-        self._scattered(solution, direction)
-        return direction
+            return np.zeros(gradient.shape)
+        given = gradient, beside, own, residual
+        self._last = self._equations
+        try:
+            return np.sum([each.newton_direction(*given) for each in self._last], axis=0)
+        except SingularError:  # or hardly positive definite
+            self._last = [self._everything]
+            return self._everything.newton_direction(*given)
 
     def next_direction(self, gradient: np.ndarray, residual: np.ndarray | float) -> np.ndarray:
         """The same for another gradient, with the Hessian that the last direction was for."""
-        direction = np.zeros(gradient.shape)
-        if self._product is not None:
-            rhs = self._downhill(gradient)
-            solution, _ = self._conjugate_gradients(self._product, rhs, np.zeros_like(rhs), residual, _STEPS)
-            self._scattered(solution, direction)
-        return direction
+        return sum((each.next_direction(gradient, residual) for each in self._last), np.zeros(gradient.shape))
 
     def direction(self, gradient: np.ndarray, beside: np.ndarray, own: np.ndarray) -> np.ndarray:
         """The same for a Hessian that is alike in both coordinates and does not mix them: `beside` (k,) is the mean
         part at the edges, `own` (n,) that at the vertices.
         """
         direction = np.zeros(gradient.shape)
-        if self.held.all():
-            return direction
-        factors = [self._factors(c, beside, own) for c in range(len(self.unknowns))]
-        self._scattered(self._solved(factors, self._downhill(gradient)), direction)
+        if not self.held.all():
+            for solve in self._solvers(beside, beside, own, False):
+                solve(-gradient, direction)
         return direction
-
-    def _downhill(self, gradient):
-        """Against the gradient (n, 2), for the unknowns, as conjugate gradients take them."""
-        if self.alike:
-            return -self.unknowns[0].gathered(gradient)
-        return -np.concatenate([self.unknowns[c].gathered(gradient[:, c]) for c in (0, 1)])[:, None]
-
-    def _scattered(self, solution, out):
-        if self.alike:
-            self.unknowns[0].spread(solution, out)
-        else:
-            first = len(self.unknowns[0])
-            for c, values in enumerate((solution[:first, 0], solution[first:, 0])):
-                self.unknowns[c].spread(values, out[:, c])
-
-    def _preconditioner(self, c, beside, own):
-        """The factors of one coordinate's own matrix; of both, if they are alike, the mean's."""
-        m, d = (beside[0], own[0]), (beside[1], own[1])
-        if not self.alike:
-            sign = 1 - 2 * c
-            m = m[0] + sign * d[0], m[1] + sign * d[1]
-        return self._factors(c, *m)
-
-    def _factors(self, c, beside, own):
-        pattern = self.patterns[c]
-        return self._factorizer(pattern.matrix(beside, beside, own), self._is_alone(_LARGE))
-
-    def _hessian(self, beside: Sequence[np.ndarray], own: Sequence[np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
-        """The product of the Hessian with values of the unknowns, shaped as these."""
-        if self.alike and not self.unknowns[0].tied:
-            matrix = self._matrix = self.patterns[0].block_matrix(beside, own, self._matrix)
-            return lambda values: (matrix @ values.ravel()).reshape(values.shape)
-        # What is not free in both coordinates alike has no blocks: multiply with those of all vertices.
-        if self._all is None:
-            self._all = Pattern(Unknowns(self.order, np.zeros(len(self.order), bool)), self.edges)
-        matrix = self._matrix = self._all.block_matrix(beside, own, self._matrix)
-
-        def product(values):
-            moved = np.zeros((len(self.order), 2))
-            self._scattered(values, moved)
-            force = np.empty_like(moved)
-            force[self.order] = (matrix @ moved[self.order].ravel()).reshape(-1, 2)
-            if self.alike:
-                return self.unknowns[0].gathered(force)
-            return np.concatenate([self.unknowns[c].gathered(force[:, c]) for c in (0, 1)])[:, None]
-
-        return product
-
-    def _solved(self, factors, rest):
-        if self.alike:
-            return factors[0].solve(rest)
-        first = len(self.unknowns[0])
-        halves = zip(factors, (rest[:first], rest[first:]), strict=True)
-        return np.concatenate([each.solve(half) for each, half in halves])
-
-    def _conjugate_gradients(self, product, rhs, solution, residual, steps):
-        """A solution and whether it misses the `residual` somewhere; every piece takes steps of its own length."""
-        if self._group is None:
-            dot, at_unknowns, ratio = np.vdot, float, _ratio_of_numbers
-            residual = float(np.max(residual))
-        else:
-            group = np.concatenate([self._group[unknowns.sequence] for unknowns in self.unknowns])
-            count = int(self._group.max()) + 1
-            ratio = _ratio
-
-            def dot(one, other):
-                return np.bincount(group, np.einsum("nc,nc->n", one, other), count)
-
-            def at_unknowns(values):
-                return values[group, None]
-
-        rest = rhs - product(solution) if solution.any() else rhs.copy()
-        enough = residual**2 * dot(rhs, rhs)
-        unfinished = dot(rest, rest) > enough
-        search, old = None, 1.0
-        for _ in range(steps):
-            if not np.any(unfinished):
-                break
-            improved = self._solved(self._mean, rest)
-            new = dot(rest, improved)
-            if search is None:
-                search = improved
-            else:
-                search *= at_unknowns(ratio(new, old))
-                search += improved
-            force = product(search)
-            length = at_unknowns(unfinished * ratio(new, dot(search, force)))
-            solution = solution + length * search
-            force *= length
-            rest -= force
-            unfinished = dot(rest, rest) > enough
-            old = new
-        return solution, bool(np.any(unfinished))
-
-
-def _ratio_of_numbers(one, other):
-    return one / other if other else 0.0
-
-
-def _ratio(one, other):
-    # 0 where a piece is finished exactly
-    return np.where(other != 0, one / np.where(other != 0, other, 1.0), 0.0)

@@ -18,7 +18,7 @@ from .session import Unwrapper
 from .settings import Settings
 from .stepping import PART, STEP, mapped
 
-_TOGETHER = 2000  # triangles of the largest island that goes together with others
+_TOGETHER = 5000  # triangles of the largest island that goes together with others
 _AT_ONCE = 60_000  # triangles of islands that go together
 _FIXED = 300  # triangles that take as long as what an island takes whatever its size
 _LEFT = 0.75  # of an island after each step, by and large,

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Equations of pieces so narrow that their matrices are bands.
+
+LAPACK factorizes both coordinates' equations at once and exactly, in less time than it takes to come near their
+solution in any other way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy.linalg.lapack import dpbtrf, dpbtrs
+
+from .errors import SingularError
+from .patterns import Unknowns, places
+
+_WIDEST = 90  # places by which neighbours may be apart in the order of elimination
+
+
+def are_narrow(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
+    """Which vertices belong to pieces that are bands when eliminated in that `order` (n,), (n,) bool.
+
+    `group` (n,) is the piece of each vertex, None where there is one.
+    """
+    place = places(order)
+    i, j = edges.T
+    apart = np.abs(place[i] - place[j]) > _WIDEST
+    if group is None or not apart.any():
+        return np.full(len(order), not apart.any())
+    wide = np.zeros(int(group.max()) + 1, bool)
+    wide[group[i[apart]]] = True
+    return ~wide[group]
+
+
+class Banded:
+    """Equations on a graph whose pieces are bands.
+
+    Parameters
+    ----------
+    unknowns : of each coordinate, or of both
+    order : (n,), in which the vertices are eliminated
+    edges : (k, 2)
+    group : (n,), the piece that each vertex belongs to, or None
+    """
+
+    def __init__(
+        self, unknowns: Sequence[Unknowns], order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None
+    ):
+        self._unknowns, self._order, self._edges, self._group = unknowns, order, edges, group
+        self._coupled: _Bands | None = None  # of both coordinates' equations,
+        self._single: list[_Bands] = []  # and of each coordinate's by themselves
+        self._solve: Callable[[np.ndarray], np.ndarray] | None = None
+
+    def newton_direction(
+        self,
+        gradient: np.ndarray,
+        beside: Sequence[np.ndarray],
+        own: Sequence[np.ndarray],
+        residual: np.ndarray | float = 0.0,
+    ) -> np.ndarray:
+        if self._coupled is None:
+            self._coupled = self._both_coupled()
+        (m, d, s, a), (own_m, own_d, own_s) = beside, own
+        entries = np.concatenate([m + d, s - a, s + a, m - d, own_m + own_d, own_s, own_m - own_d])
+        self._solve = self._coupled.factorized(entries)
+        return self.next_direction(gradient, residual)
+
+    def next_direction(self, gradient: np.ndarray, _residual: np.ndarray | float = 0.0) -> np.ndarray:
+        assert self._solve is not None
+        direction, rest = np.zeros(gradient.shape), np.empty(sum(len(one) for one in self._of_both))
+        for which, unknowns, values in zip(self._which, self._of_both, gradient.T, strict=True):
+            rest[which] = unknowns.gathered(-values)
+        solution = self._solve(rest)
+        for which, unknowns, values in zip(self._which, self._of_both, direction.T, strict=True):
+            unknowns.spread(solution[which], values)
+        return direction
+
+    def solver(
+        self, forward: np.ndarray, _backward: np.ndarray, own: np.ndarray, _exactly: bool = True
+    ) -> Callable[[np.ndarray, np.ndarray], None]:
+        if not self._single:
+            self._single = [self._alone(unknowns) for unknowns in self._unknowns]
+        entries = np.concatenate([forward, own])
+        solves = [bands.factorized(entries) for bands in self._single]
+
+        def solve(sources, values):
+            each = [slice(None)] if len(solves) == 1 else [slice(0, 1), slice(1, 2)]
+            for columns, unknowns, one in zip(each, self._unknowns, solves, strict=True):
+                unknowns.spread(one(unknowns.gathered(sources[:, columns])), values[:, columns])
+
+        return solve
+
+    @property
+    def _of_both(self):
+        return self._unknowns[0], self._unknowns[-1]
+
+    def _both_coupled(self):
+        """The bands in which every vertex's U is followed by its V."""
+        if len(self._unknowns) == 1:
+            self._which = slice(0, None, 2), slice(1, None, 2)
+            size = 2 * len(self._unknowns[0])
+        else:
+            place = places(self._order)
+            at = [2 * place[unknowns.sequence] + c for c, unknowns in enumerate(self._unknowns)]
+            there = np.zeros(2 * len(place), bool)
+            there[np.concatenate(at)] = True
+            number, size = np.cumsum(there) - 1, int(there.sum())
+            self._which = tuple(number[each] for each in at)
+        everything, piece = np.arange(size), None if self._group is None else np.empty(size, np.int64)
+        at_vertices = []
+        for which, unknowns in zip(self._which, self._of_both, strict=True):
+            if piece is not None:
+                piece[which] = self._group[unknowns.sequence]
+            at_vertices.append(np.append(everything[which], -1)[unknowns.number])
+        (ui, uj), (vi, vj) = (number[self._edges.T] for number in at_vertices)
+        u, v = at_vertices
+        row, column = np.concatenate([ui, ui, vi, vi, u, u, v]), np.concatenate([uj, vj, uj, vj, u, v, v])
+        tied = any(unknowns.tied for unknowns in self._unknowns)
+        return _Bands(row, column, size, piece, 4 * len(self._edges) if tied else 0)
+
+    def _alone(self, unknowns):
+        i, j = unknowns.number[self._edges.T]
+        row, column = np.concatenate([i, unknowns.number]), np.concatenate([j, unknowns.number])
+        piece = None if self._group is None else self._group[unknowns.sequence]
+        return _Bands(row, column, len(unknowns), piece, len(self._edges) if unknowns.tied else 0)
+
+
+class _Bands:
+    """Where the entries of symmetric matrices go in bands, of which there is one for all pieces of about one width.
+
+    Parameters
+    ----------
+    row, column : (e,), the unknowns that every entry joins, in either order; -1 for what is no unknown
+    size : the number of unknowns
+    piece : (size,), the piece that each belongs to, one after the other; None where there is one
+    twice : so many first entries stand for a second one, in the same place if they join an unknown to itself, which
+        they do only where some move together
+    """
+
+    def __init__(self, row: np.ndarray, column: np.ndarray, size: int, piece: np.ndarray | None, twice: int):
+        self._entry = entry = np.flatnonzero((row >= 0) & (column >= 0))
+        low, gap = np.minimum(row[entry], column[entry]), np.abs(row[entry] - column[entry])
+        self._twice = np.where((entry < twice) & (gap == 0), 2.0, 1.0) if twice else None
+        self._order = None
+        if piece is None or not size:
+            ends, widths = [size], [int(gap.max(initial=0))]
+        else:
+            run = np.cumsum(np.diff(piece, prepend=piece[0]) != 0)
+            width = np.zeros(run[-1] + 1, np.int64)
+            np.maximum.at(width, run[low], gap)
+            kind = np.frexp(width)[1][run]  # of one kind are those up to the same power of two
+            self._order = np.argsort(kind, kind="stable")
+            low = places(self._order)[low]
+            count = np.bincount(kind)
+            there = np.flatnonzero(count)
+            ends = np.cumsum(count[there]).tolist()
+            widths = [int(width[run[kind == each]].max()) for each in there.tolist()]
+        self._columns = [slice(*both) for both in zip([0, *ends[:-1]], ends, strict=True)]
+        self._rows = [width + 1 for width in widths]
+        height = np.repeat(self._rows, [its.stop - its.start for its in self._columns])
+        self._length, self._place = int(height.sum()), (np.cumsum(height) - height)[low] + gap
+
+    def factorized(self, entries: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """The function that solves for right-hand sides (size, ...) with the matrix of the `entries` (e,).
+
+        Raises `SingularError` where that is not positive definite.
+        """
+        entries, bands = entries[self._entry], np.zeros(self._length)
+        if self._twice is None:
+            bands[self._place] = entries
+        else:
+            np.add.at(bands, self._place, self._twice * entries)
+        factors, first = [], 0
+        for rows, its in zip(self._rows, self._columns, strict=True):
+            end = first + rows * (its.stop - its.start)
+            band = bands[first:end].reshape(-1, rows).T
+            factor, failed = dpbtrf(band, lower=1, overwrite_ab=1) if band.size else (band, 0)
+            if failed or not np.isfinite(factor[0].sum()):  # LAPACK goes on where something is not a number
+                raise SingularError("its equations have no solution: merge its vertices by distance, or mark seams")
+            factors.append(factor)
+            first = end
+
+        def solve(rhs):
+            rest = rhs if self._order is None else rhs[self._order]
+            if len(factors) == 1:
+                solution = _solved(factors[0], rest)
+            else:
+                parts = [_solved(factor, rest[its]) for factor, its in zip(factors, self._columns, strict=True)]
+                solution = np.concatenate(parts)
+            if self._order is None:
+                return solution
+            result = np.empty(rhs.shape)
+            result[self._order] = solution
+            return result
+
+        return solve
+
+
+def _solved(factor, rhs):
+    return dpbtrs(factor, rhs, lower=1)[0] if len(rhs) else rhs

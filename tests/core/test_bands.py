@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import numpy as np
+import pytest
+
+from qh_unwrap.core import Surface, bands
+from qh_unwrap.core.bands import Banded, are_narrow
+from qh_unwrap.core.errors import SingularError
+from qh_unwrap.core.patterns import Unknowns
+from qh_unwrap.core.pieces import joined
+from qh_unwrap.core.systems import Constrained
+
+from . import shapes
+from .test_systems import laplacian_of, random_blocks
+
+
+def ribbon_and_sheet():
+    return Surface(*joined(*zip(shapes.grid(60, 1), shapes.grid(12, 12), strict=True)))
+
+
+def test_what_is_narrow_does_not_depend_on_its_company(monkeypatch):
+    monkeypatch.setattr(bands, "_WIDEST", 6)
+    surface = ribbon_and_sheet()
+    narrow = are_narrow(surface.order, surface.edges, surface.vertex_piece)
+    np.testing.assert_array_equal(narrow, surface.vertex_piece == 0)
+    for k in (0, 1):
+        alone = surface.one(k)
+        assert (are_narrow(alone.order, alone.edges) == (k == 0)).all()
+
+
+def test_pieces_are_solved_in_company_as_they_are_alone(monkeypatch):
+    monkeypatch.setattr(bands, "_WIDEST", 6)
+    surface = ribbon_and_sheet()
+    n = len(surface.vertices)
+    beside, own, _ = random_blocks(surface.edges, n, 1)
+    gradient = np.random.default_rng(2).normal(size=(n, 2))
+    system = Constrained(surface.order, surface.edges, np.zeros(n, bool), gradient, group=surface.vertex_piece)
+    together = system.newton_direction(gradient, beside, own, 1e-12)
+    for k in (0, 1):
+        alone, rows = surface.one(k), surface.vertex_piece == k
+        edges = rows[surface.edges[:, 0]]
+        system = Constrained(alone.order, alone.edges, np.zeros(rows.sum(), bool), gradient[rows])
+        its = [each[edges] for each in beside], [each[rows] for each in own]
+        np.testing.assert_allclose(together[rows], system.newton_direction(gradient[rows], *its, 1e-12), atol=1e-9)
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_matrices_that_are_not_positive_definite_are_solved_another_way(alike):
+    surface = Surface(*shapes.grid(5, 5))
+    n = len(surface.vertices)
+    held = np.zeros((n, 2), bool)
+    held[0] = True
+    held[3, 0] = not alike or held[3, 1]
+    values, weights = np.random.default_rng(3).normal(size=(n, 2)), -np.ones((2, len(surface.edges)))
+    system = Constrained(surface.order, surface.edges, held, values)
+    matrix = laplacian_of(surface.edges, weights, n)
+    np.testing.assert_allclose((matrix @ system.solve(weights))[~held.any(axis=1)], 0, atol=1e-9)
+
+    beside, own, _ = random_blocks(surface.edges, n, 4)
+    own[0][5] = 0.0  # so that the blocks at a vertex's own place are not positive definite
+    gradient = np.random.default_rng(5).normal(size=(n, 2))
+    with pytest.raises(SingularError):
+        Banded(system.unknowns, surface.order, surface.edges).newton_direction(gradient, beside, own)
+    one, other = system.newton_direction(gradient, beside, own, 1e-9), system.next_direction(gradient[::-1], 1e-9)
+    for found in (one, other):
+        assert np.isfinite(found).all() and not found[held].any() and found.any()
+
+
+def test_what_is_not_finite_is_not_solved():
+    surface = Surface(*shapes.grid(4, 4))
+    n = len(surface.vertices)
+    everything = [Unknowns(surface.order, np.zeros(n, bool))]
+    beside, own, _ = random_blocks(surface.edges, n, 6)
+    for value in (np.nan, np.inf):
+        own[0][7] = value
+        with pytest.raises(SingularError):
+            Banded(everything, surface.order, surface.edges).newton_direction(np.zeros((n, 2)), beside, own)
