@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .certificate import orientation
+from .certificate import orientation, turn
 from .errors import BoundaryError
 from .loops import followers
-from .pieces import among, components
 from .triangles import corners_of, signed_areas
 
 Triangulator = Callable[[np.ndarray, np.ndarray], np.ndarray | None]
@@ -77,7 +76,7 @@ def make_air(
         raise BoundaryError(f"the triangulator returned numbers of points outside 0 to {len(points) - 1}")
     if signed_areas(corners_of(points, triangles)).sum() < 0:
         triangles = triangles[:, ::-1]
-    triangles = _outside(triangles, sides, len(points))
+    triangles = _outside(points, triangles, sides)
     if triangles is None or len(np.unique(triangles)) < len(points):
         return None
     added = len(built) + len(between) + _CIRCLE
@@ -204,25 +203,25 @@ def _within(points, start, end):
     return result
 
 
-def _outside(triangles, sides, n):
-    """The triangles that lie on the right of the `sides` (s, 2); None if these do not separate them from the others."""
-    m, n = len(triangles), np.int64(n)
-    triangles = triangles.astype(np.int64, copy=False)
-    start, end = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
-    owner = np.tile(np.arange(m), 3)
-    forward, backward = sides @ [n, 1], sides @ [1, n]
-    key = start * n + end
-    with_side, against_side = (among(key, np.sort(wanted)) for wanted in (forward, backward))
-    edge = np.minimum(start, end) * n + np.maximum(start, end)
-    inner = np.flatnonzero(~with_side & ~against_side)
-    inner = inner[np.argsort(edge[inner], kind="stable")]
-    twins = edge[inner[1:]] == edge[inner[:-1]]
-    one, other = owner[inner[:-1][twins]], owner[inner[1:][twins]]
-    part = components(m, one, other)[1]
-    outside = np.isin(part, part[owner[against_side]])
-    if against_side.sum() != len(sides) or outside[owner[with_side]].any():
+def _outside(points, triangles, sides):
+    """The triangles of `points` (n, 2) that lie on the right of the `sides` (s, 2) of closed polygons; None if these
+    are not all edges, or do not separate such triangles from the others."""
+    following, before = np.full((2, len(points)), -1)
+    following[sides[:, 0]], before[sides[:, 1]] = sides[:, 1], sides[:, 0]
+    v, w = triangles.T, np.roll(triangles, -1, axis=1).T
+    ahead, behind = following[v], before[v]
+    if (ahead == w).sum() != len(sides) or (behind == w).sum() != len(sides):
         return None
-    return triangles[outside]
+    # At a polygon's vertex v, those lie on the left whose first side, from v to w, is the way ahead, or lies between
+    # that and the way back.
+    at = np.flatnonzero((ahead >= 0).ravel())
+    v, w, ahead, behind = (each.ravel()[at] for each in (v, w, ahead, behind))
+    here, beside, next_one, last_one = points[v], points[w], points[ahead], points[behind]
+    after = (w == ahead) | (turn(here, next_one, beside) > 0)
+    ends = (w != behind) & (turn(here, beside, last_one) > 0)
+    left = np.where(turn(last_one, here, next_one) > 0, after & ends, after | ends)
+    count = np.bincount(at[left] % len(triangles), minlength=len(triangles))
+    return triangles[count == 0] if np.isin(count, (0, 3)).all() else None
 
 
 def quality(corners: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .air import Air, Triangulator, make_air, quality
+from .bands import are_narrow
 from .certificate import orientation
 from .chart import Chart, Surface, air_chart
 from .ordering import elimination_order, local_order
@@ -26,6 +27,7 @@ _WORN = 0.05  # air is renewed when a triangle keeps less than this part of its 
 _IN_THE_WAY = 0.2  # or less than this where it may be what keeps steps short, or when one that was left out
 _OPEN = 1e-3  # has come to this quality, and is
 _GROWN = 0.05  # times as large as it would be without distortion
+_SHORT = 2  # squared number of an island's sides on its boundary, relative to the number of its vertices
 
 
 Walls = Sequence[np.ndarray | None] | None
@@ -336,10 +338,7 @@ class Plane:
         bool; where it is by dissection, that of the island serves on."""
         n, dissection, edges = len(self.island.vertices), self.island.dissection, self.triangles.edges
         if dissection is None:
-            chosen = pieces[self.vertex_piece]
-            rows, number = np.flatnonzero(chosen), np.cumsum(chosen) - 1
-            edges = number[edges[chosen[edges[:, 0]]]]
-            return np.concatenate([first, rows[local_order(len(rows), edges, self.vertex_piece[rows])]])
+            return np.concatenate([first, self._local_order(pieces)])
         # Air is taken apart like the outline beside it.
         outline = np.unique(np.concatenate(self.island.loops))
         inner = outline[~dissection.separates(dissection.key[outline])]
@@ -347,6 +346,23 @@ class Plane:
         shift = 4 * np.ptp(uv, axis=0).max() * self.vertex_piece[:, None]  # no piece lies beside another
         like = beside[cKDTree((uv + shift)[beside]).query((uv + shift)[n:])[1]]
         return dissection.extended(like, edges[(edges >= n).any(axis=1)]).order
+
+    def _local_order(self, pieces):
+        """The same for the chosen `pieces` (p,) bool, where none is large: by the graph alone."""
+        island, piece = self.island, self.vertex_piece
+        n = len(island.vertices)
+        # Little of what the air fills in reaches beyond a short outline: then the island's own order serves on.
+        sides = np.bincount(island.loop_piece, [len(loop) for loop in island.loops])
+        short = sides**2 <= _SHORT * np.diff(island.vertex_starts, append=n)
+        order = island.order
+        serves = pieces & short & ~are_narrow(order, island.edges, island.vertex_piece)[island.vertex_starts]
+        order = order[serves[piece[order]]]
+        for chosen in (serves[piece] & (np.arange(len(piece)) >= n), (pieces & ~serves)[piece]):
+            rows, number = np.flatnonzero(chosen), np.cumsum(chosen) - 1
+            if len(rows):
+                its = number[self.triangles.edges[chosen[self.triangles.edges].all(axis=1)]]
+                order = np.concatenate([order, rows[local_order(len(rows), its, piece[rows])]])
+        return order[np.argsort(piece[order], kind="stable")]
 
     def fix(self, fixed: Fixed, uv: np.ndarray) -> None:
         n = len(fixed.held)

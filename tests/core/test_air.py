@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from qh_unwrap.core import Settings, Surface, distortion, errors, unwrap
+from qh_unwrap.core import Settings, Surface, bands, distortion, errors, unwrap
 from qh_unwrap.core.air import _within, make_air
 from qh_unwrap.core.certificate import is_injective
 from qh_unwrap.core.delaunay import triangulate
@@ -64,6 +64,40 @@ def test_air_needs_an_outline_that_does_not_cross_itself():
     uv[[a, b]] = uv[[b, a]]
     assert make_air(uv, surface.loops, triangulate) is None
     assert make_air(0 * uv, surface.loops, triangulate) is None
+
+
+@pytest.mark.parametrize("turned", [(0,), (1,), (0, 1)])
+def test_air_needs_loops_that_run_the_right_way(turned):
+    surface = Surface(*shapes.ring(24, 3))
+    uv = surface.vertices[:, :2]
+    loops = [loop[::-1] if k in turned else loop for k, loop in enumerate(surface.loops)]
+    assert make_air(uv, surface.loops, triangulate) is not None
+    assert make_air(uv, loops, triangulate) is None
+
+
+def test_air_needs_triangles_with_all_sides():
+    surface = Surface(*shapes.random_disk(1))
+
+    def with_others(points, sides):
+        number = np.arange(len(points))
+        number[[0, 5]] = number[[5, 0]]
+        return number[triangulate(points, sides)]
+
+    assert make_air(surface.vertices[:, :2], surface.loops, with_others) is None
+
+
+def test_behind_a_short_outline_the_islands_own_order_serves_on(monkeypatch):
+    monkeypatch.setattr(bands, "_WIDEST", -1)
+    meshes = [shapes.bump(1, inner=900, outer=20), shapes.bump(2, inner=100, outer=40)]
+    surface = Surface(*joined(*zip(*meshes, strict=True)))
+    uv = surface.vertices[:, :2] + 9 * surface.vertex_piece[:, None]
+    plane = Plane(surface, uv, Fixed(np.zeros(uv.shape, bool), uv), airs_around(surface, uv, triangulate), triangulate)
+    order, first = plane.constrained.order, surface.order[surface.vertex_piece[surface.order] == 0]
+    np.testing.assert_array_equal(order[: len(first)], first)
+    assert (np.sort(order) == np.arange(len(plane.vertex_piece))).all()
+    assert (np.diff(plane.vertex_piece[order]) >= 0).all()
+    second = order[plane.vertex_piece[order] == 1]
+    assert (np.diff(second < len(uv)) != 0).sum() > 1, "behind a long one it and the air are eliminated together"
 
 
 def test_a_flat_patch_is_a_fixed_point_with_air_around_it():
