@@ -17,6 +17,7 @@ from .triangles import by_parts, corners_of
 if TYPE_CHECKING:
     from .chart import Chart, Surface
 
+_ROUNDING = 1e-15  # largest rounding error of a difference of two products, relative to these (Shewchuk 1997)
 _CROWDED = 30  # pairs that lie side by side for each box, from which on strips pay
 _MOST = 1_000_000  # strips of all groups, that rounding can tell apart
 _PORTION = 100_000  # pairs of boxes that are looked at together, about: it bounds the memory
@@ -56,13 +57,17 @@ def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     (n,)."""
     (bx, by), (cx, cy) = (b - a).T, (c - a).T
     first, second = bx * cy, by * cx
-    apart = first - second
-    result = np.sign(apart).astype(np.int8)
-    # Where the two products nearly cancel, rounding decides (Shewchuk 1997 bounds the error): then look closer.
-    close = np.abs(apart) <= 1e-15 * (np.abs(first) + np.abs(second))
-    close = np.flatnonzero(close & (first != 0) & (second != 0))
-    if len(close):
-        result[close] = _exact_turn(a[close], b[close], c[close])
+    apart, error = first - second, _ROUNDING * (np.abs(first) + np.abs(second))
+    result = (apart > error).astype(np.int8)
+    result -= apart < -error
+    if not result.all():
+        # Where the two products nearly cancel, rounding decides: then look closer.
+        zero = np.flatnonzero(result == 0)
+        first, second, apart, error = (each[zero] for each in (first, second, apart, error))
+        result[zero] = np.sign(apart)
+        close = zero[(np.abs(apart) <= error) & (first != 0) & (second != 0)]
+        if len(close):
+            result[close] = _exact_turn(a[close], b[close], c[close])
     return result
 
 

@@ -74,8 +74,7 @@ class Descent:
         """
         uv = domain.renewed(uv, self._hindered)
         energy = self._energy_of(domain, uv)
-        before = energy.jacobian(uv)
-        start = energy.value(before)
+        before, start = energy.resting, energy.resting_value
         sound = np.isfinite(start)
         if not (sound & going).any():
             return uv, uv, np.ones(len(start), bool)

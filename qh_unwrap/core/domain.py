@@ -390,8 +390,11 @@ class Plane:
         """
         result = np.zeros(self.island.piece_count, bool)
         gaps, piece = self._left_out
-        opened = (quality(corners_of(uv, gaps)) > _OPEN) & (orientation(uv, gaps) > 0)
-        if opened.any():
+        if len(gaps):
+            opened = quality(corners_of(uv, gaps)) > _OPEN
+            gaps, piece = gaps[opened], piece[opened]
+        if len(gaps):
+            opened = orientation(uv, gaps) > 0
             gaps, piece = gaps[opened], piece[opened]
             size = np.sqrt(np.abs(self.island.sums(signed_areas(corners_of(uv, self.island.triangles)))))
             on_rim = (gaps < len(self.island.vertices)).all(axis=1)

@@ -87,7 +87,10 @@ class Barrier:
         self.rest(uv)
 
     def rest(self, uv: np.ndarray) -> None:
-        """Take the shape that the air has in the map `uv` (n, 2), which is to be improved, for that at rest."""
+        """Take the shape that the air has in the map `uv` (n, 2), which is to be improved, for that at rest.
+
+        The map's derivative and value are kept in `resting` and `resting_value`.
+        """
         # A face without area in space that lies folded over bars nothing: nothing could be done about it.
         self._void = None
         for chart, part in self._solid:
@@ -101,9 +104,10 @@ class Barrier:
             self._void = None
         for chart, part in self._air:
             self._hats[..., part] = hat_gradients(chart.shapes(uv))
-            self._weight[part] = 0
+            self._weight[part] = 1
+        self.resting = self.jacobian(uv)
+        self.resting_value = value = self.value(self.resting)
         if self._air:
-            value = self.value(self.jacobian(uv))
             value = np.where(np.isfinite(value), value, 1.0)  # else the map is given up anyway
             weight = AIR * np.sqrt(value * np.maximum(value - self.least, _THIN))
             counts = sum(chart.sums(chart.barrier) for chart, _ in self._air)
