@@ -18,19 +18,24 @@ from .patterns import Unknowns, places
 _WIDEST = 90  # places by which neighbours may be apart in the order of elimination
 
 
-def are_narrow(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
-    """Which vertices belong to pieces that are bands when eliminated in that `order` (n,), (n,) bool.
+def widths(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
+    """By how many places neighbours are apart at most in that `order` (n,), in every piece, (p,).
 
     `group` (n,) is the piece of each vertex, None where there is one.
     """
     place = places(order)
     i, j = edges.T
-    apart = np.abs(place[i] - place[j]) > _WIDEST
-    if group is None or not apart.any():
-        return np.full(len(order), not apart.any())
-    wide = np.zeros(int(group.max()) + 1, bool)
-    wide[group[i[apart]]] = True
-    return ~wide[group]
+    apart = np.abs(place[i] - place[j])
+    if group is None:
+        return np.array([apart.max(initial=0)])
+    result = np.zeros(int(group.max(initial=0)) + 1, np.int64)
+    np.maximum.at(result, group[i], apart)
+    return result
+
+
+def are_narrow(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
+    """Which pieces are bands when eliminated in that `order` (n,), (p,) bool."""
+    return widths(order, edges, group) <= _WIDEST
 
 
 class Banded:

@@ -355,7 +355,7 @@ class Plane:
         sides = np.bincount(island.loop_piece, [len(loop) for loop in island.loops])
         short = sides**2 <= _SHORT * np.diff(island.vertex_starts, append=n)
         order = island.order
-        serves = pieces & short & ~are_narrow(order, island.edges, island.vertex_piece)[island.vertex_starts]
+        serves = pieces & short & ~are_narrow(order, island.edges, island.vertex_piece)
         order = order[serves[piece[order]]]
         for chosen in (serves[piece] & (np.arange(len(piece)) >= n), (pieces & ~serves)[piece]):
             rows, number = np.flatnonzero(chosen), np.cumsum(chosen) - 1

@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mckee
 from scipy.sparse.linalg import spilu
 
-from .bands import are_narrow
+from .bands import are_narrow, widths
 from .patterns import places
 
 _LEAF = 16  # vertices: so few are not divided any further
@@ -34,19 +34,20 @@ def local_order(n: int, edges: np.ndarray, group: np.ndarray | None = None) -> n
     """The same for groups that are not large, which needs no points."""
     if not len(edges):
         return np.arange(n)
-    near = _banded(n, edges)
-    if group is not None:
-        near = near[np.argsort(group[near], kind="stable")]  # one piece after the other
-    narrow = are_narrow(near, edges, group)
+    given, near = np.arange(n), _banded(n, edges)
+    piece = np.zeros(n, np.int64) if group is None else group
+    if group is not None:  # one piece after the other
+        given, near = (order[np.argsort(group[order], kind="stable")] for order in (given, near))
+    one, other = (widths(order, edges, group) for order in (given, near))
+    near = np.where((one < other)[piece[given]], given, near)  # as grids are often numbered row by row
+    narrow = are_narrow(near, edges, group)[piece]
     if narrow.all():
         return near
     near, wide = near[narrow[near]], near[~narrow[near]]
     place = np.full(n, -1, np.int32)
     place[wide] = np.arange(len(wide), dtype=np.int32)
     order = wide[_by_minimum_degree(len(wide), place[edges[~narrow[edges[:, 0]]]])]
-    if group is not None:
-        order = order[np.argsort(group[order], kind="stable")]
-    return np.concatenate([near, order])
+    return np.concatenate([near, order[np.argsort(piece[order], kind="stable")]])
 
 
 def _banded(n, edges):

@@ -97,6 +97,7 @@ class Constrained:
         """Those of all pieces whose matrices are symmetric and positive definite; what suits each depends on it alone,
         and not on its company."""
         narrow = are_narrow(self.order, self.edges, self._group)
+        narrow = np.full(len(self.order), narrow[0]) if self._group is None else narrow[self._group]
         found: list[Equations] = []
         if narrow.any():
             found.append(Banded(self._unknowns_of(narrow), self.order, self.edges, self._group))

@@ -5,6 +5,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
 from qh_unwrap.core import Surface, ordering
+from qh_unwrap.core.bands import widths
 from qh_unwrap.core.ordering import elimination_order
 from qh_unwrap.core.pieces import joined
 
@@ -47,6 +48,20 @@ def test_orders_of_tiny_and_edgeless_graphs():
     same = np.zeros((50, 3))
     chain = np.column_stack([np.arange(49), np.arange(1, 50)])
     assert sorted(elimination_order(same, chain).tolist()) == list(range(50))
+
+
+def test_each_grid_is_eliminated_row_by_row_if_it_is_numbered_so():
+    vertices, _ = shapes.grid(16, 16)
+    a = np.add.outer(17 * np.arange(16), np.arange(16)).ravel()
+    b, c, d = a + 1, a + 18, a + 17
+    one = np.random.default_rng(1).random(len(a)) < 0.5  # of both ways to halve a square
+    triangles = np.vstack([np.array(each).T[its] for each, its in (([a, b, c], one), ([a, c, d], one))])
+    triangles = np.vstack([triangles, *(np.array(each).T[~one] for each in ([a, b, d], [b, c, d]))])
+    number = np.random.default_rng(0).permutation(len(vertices))
+    shuffled = vertices[np.argsort(number)], number[triangles]
+    surface = Surface(*joined(*zip((vertices, triangles), shuffled, (vertices, triangles), strict=True)))
+    first, second, third = widths(surface.order, surface.edges, surface.vertex_piece)
+    assert first == third == 18 < second < 40
 
 
 @pytest.mark.parametrize("inner", [(40, 90, 20), (900, 60, 2500, 300)])
