@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import maximum_bipartite_matching, reverse_cuthill_mckee
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import breadth_first_order, maximum_bipartite_matching
 from scipy.sparse.linalg import spilu
 
 from .bands import are_narrow, widths
 from .patterns import places
+from .pieces import components
 
 _LEAF = 16  # vertices: so few are not divided any further
 _MANY = 25_000  # vertices of the largest piece, beyond which dissection leaves less fill than minimum degree
@@ -34,10 +35,9 @@ def local_order(n: int, edges: np.ndarray, group: np.ndarray | None = None) -> n
     """The same for groups that are not large, which needs no points."""
     if not len(edges):
         return np.arange(n)
-    given, near = np.arange(n), _banded(n, edges)
     piece = np.zeros(n, np.int64) if group is None else group
-    if group is not None:  # one piece after the other
-        given, near = (order[np.argsort(group[order], kind="stable")] for order in (given, near))
+    given = np.argsort(piece, kind="stable")  # one piece after the other
+    near = _banded(n, edges, piece)
     one, other = (widths(order, edges, group) for order in (given, near))
     near = np.where((one < other)[piece[given]], given, near)  # as grids are often numbered row by row
     narrow = are_narrow(near, edges, group)[piece]
@@ -50,12 +50,30 @@ def local_order(n: int, edges: np.ndarray, group: np.ndarray | None = None) -> n
     return np.concatenate([near, order[np.argsort(piece[order], kind="stable")]])
 
 
-def _banded(n, edges):
-    """Neighbours soon after one another."""
-    i, j = edges.T.astype(np.int32)
+def _banded(n, edges, piece):
+    """Neighbours soon after one another (Cuthill, McKee 1969), one piece after the other, each as if it were alone.
+
+    Each begins with the vertex that is found last from one with the fewest neighbours.
+    """
+    by_degree = np.argsort(np.bincount(edges.ravel(), minlength=n), kind="stable")
+    i, j = places(by_degree).astype(np.int32)[edges.T]
     both = np.concatenate([i, j]), np.concatenate([j, i])
     graph = coo_array((np.ones(2 * len(i), np.int8), both), shape=(n, n)).tocsr()
-    return reverse_cuthill_mckee(graph, symmetric_mode=True).astype(np.int64)
+    graph.sort_indices()
+    its = piece[by_degree]
+    starts = np.unique(its, return_index=True)[1]
+    for _ in range(2):
+        # All pieces at once, from a root that is joined to one vertex of each
+        columns = np.append(graph.indices, starts)
+        rows = np.append(graph.indptr, len(columns))
+        rooted = csr_array((np.ones(len(columns)), columns, rows), shape=(n + 1, n + 1))
+        found = breadth_first_order(rooted, n, return_predecessors=False)[1:]
+        if len(found) < n:  # some fall into parts
+            order = _banded(n, edges, components(n, *edges.T)[1])
+            return order[np.argsort(piece[order], kind="stable")]
+        found = found[np.argsort(its[found], kind="stable")]
+        starts = found[np.flatnonzero(np.diff(its[found], append=-1))]
+    return by_degree[found]
 
 
 def _by_minimum_degree(n, edges):

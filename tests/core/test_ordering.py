@@ -77,6 +77,25 @@ def test_pieces_are_eliminated_with_as_little_fill_as_alone(inner):
     assert fill(batch, order) < 1.1 * alone
 
 
+def test_narrow_pieces_are_eliminated_as_they_are_alone():
+    meshes = [shapes.bump(k, inner=count, outer=12) for k, count in enumerate((30, 200, 3, 90, 30))]
+    meshes += [shapes.grid(4, 9), shapes.grid(1, 60), shapes.ring(30, 4)]
+    batch = Surface(*joined(*zip(*meshes, strict=True)))
+    for k, mesh in enumerate(meshes):
+        its = batch.order[batch.vertex_piece[batch.order] == k] - batch.vertex_starts[k]
+        np.testing.assert_array_equal(its, Surface(*mesh).order)
+
+
+def test_orders_of_graphs_that_fall_into_parts():
+    edges = np.array([[0, 3], [1, 4], [4, 7], [2, 5], [5, 8]])  # and 6 has no neighbour
+    order = ordering.local_order(9, edges)
+    assert sorted(order.tolist()) == list(range(9))
+    assert widths(order, edges)[0] == 1
+    piece = np.arange(9) % 3
+    order = ordering.local_order(9, edges, piece)
+    assert (np.diff(piece[order]) >= 0).all() and widths(order, edges)[0] == 1
+
+
 def test_some_pieces_are_eliminated_as_all_are():
     meshes = [shapes.bump(k, inner=count, outer=20) for k, count in enumerate((300, 200, 400))]
     batch = Surface(*joined(*zip(*meshes, strict=True)))
