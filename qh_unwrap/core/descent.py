@@ -22,7 +22,7 @@ _ARMIJO = 1e-4  # of the decrease that the slope promises, the least that is tak
 _HALVINGS = 20  # of the step, at most
 _PROMISING = 0.6  # of what the slope promises: a decrease by more is worth a longer step
 _LONGER = 1.5  # times as long
-_LENGTHENINGS = 4  # of the step, at most
+_LENGTHENINGS = 12  # of the step, at most: what has all but collapsed opens in few
 _NEGLIGIBLE = 1e-3  # a decrease smaller than this, relative to the energy, is not worth another step,
 _LITTLE = 2e-2  # nor is one smaller than this, relative to what the energy lies above its least possible value
 _INVISIBLE = 1e-6  # a decrease of the energy that nobody could see
@@ -107,8 +107,8 @@ class Descent:
         limit     (p,), the longest step that was looked at
         """
         worth = np.minimum(_NEGLIGIBLE * start, np.maximum(_LITTLE * (start - energy.least), _INVISIBLE))
-        # What was cut short and promised more gets another step.
-        hindered = (limit < 1) & (promised > worth) & ~self._little
+        # What promised more gets another step, if it was cut short or air may have been in its way.
+        hindered = ((limit < 1) | energy.in_air) & (promised > worth) & ~self._little
         drop, worth = start - value, worth / self._patience
         little = drop < worth
         # A step that has brought what it promised is followed by one that brings far less; but air gives way a bit more

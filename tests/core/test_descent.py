@@ -212,6 +212,19 @@ def test_far_from_the_end_steps_go_farther_than_newton_s():
     assert values[-1] < values[0] / 100
 
 
+def test_a_face_without_area_that_has_all_but_collapsed_opens_in_few_steps():
+    vertices = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (2, 1, 0)]
+    report = unwrap(vertices, [(0, 1, 2), (0, 2, 4), (0, 4, 3)]).report
+    assert report.converged and report.injective
+    assert report.iterations <= 20  # Newton's own length would take a hundred, from an energy of 1e14
+    assert report.after.symmetric_dirichlet < 1 + 1e-6
+
+
+def test_in_air_what_promised_more_gets_another_step():
+    vertices, triangles = hundred()["spiral 7"]  # of which one step in the middle brings a quarter of its promise
+    assert unwrap(vertices, triangles).report.after.symmetric_dirichlet < 1.009
+
+
 def test_air_holds_no_step_back():
     surface, uv = bent(9)[:2]
     domain = Plane(surface, uv, Fixed(np.zeros(uv.shape, bool), uv), airs_around(surface, uv, triangulate), triangulate)
