@@ -12,10 +12,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 
-from .errors import SingularError
 from .patterns import Unknowns, places
 
 _WIDEST = 90  # places by which neighbours may be apart in the order of elimination
+
+
+class IndefiniteError(Exception):
+    """The matrices of some `pieces`, (i,) int, are not positive definite, at least not up to rounding."""
+
+    def __init__(self, pieces: np.ndarray):
+        super().__init__()
+        self.pieces = pieces
 
 
 def widths(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
@@ -39,7 +46,7 @@ def are_narrow(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = 
 
 
 class Banded:
-    """Equations on a graph whose pieces are bands.
+    """Equations on a graph whose pieces are bands.  They raise `IndefiniteError`.
 
     Parameters
     ----------
@@ -147,7 +154,7 @@ class _Bands:
         self._entry = entry = np.flatnonzero((row >= 0) & (column >= 0))
         low, gap = np.minimum(row[entry], column[entry]), np.abs(row[entry] - column[entry])
         self._twice = np.where((entry < twice) & (gap == 0), 2.0, 1.0) if twice else None
-        self._order = None
+        self._order, self._piece = None, np.zeros(size, np.int64) if piece is None else piece
         if piece is None or not size:
             ends, widths = [size], [int(gap.max(initial=0))]
         else:
@@ -156,6 +163,7 @@ class _Bands:
             np.maximum.at(width, run[low], gap)
             kind = np.frexp(width)[1][run]  # of one kind are those up to the same power of two
             self._order = np.argsort(kind, kind="stable")
+            self._piece = piece[self._order]
             low = places(self._order)[low]
             count = np.bincount(kind)
             there = np.flatnonzero(count)
@@ -169,22 +177,17 @@ class _Bands:
     def factorized(self, entries: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The function that solves for right-hand sides (size, ...) with the matrix of the `entries` (e,).
 
-        Raises `SingularError` where that is not positive definite.
+        Raises `IndefiniteError`.
         """
-        entries, bands = entries[self._entry], np.zeros(self._length)
-        if self._twice is None:
-            bands[self._place] = entries
-        else:
-            np.add.at(bands, self._place, self._twice * entries)
-        factors, first = [], 0
-        for rows, its in zip(self._rows, self._columns, strict=True):
-            end = first + rows * (its.stop - its.start)
-            band = bands[first:end].reshape(-1, rows).T
-            factor, failed = dpbtrf(band, lower=1, overwrite_ab=1) if band.size else (band, 0)
-            if failed or not np.isfinite(factor[0].sum()):  # LAPACK goes on where something is not a number
-                raise SingularError("its equations have no solution: merge its vertices by distance, or mark seams")
+        entries = entries[self._entry]
+        factors, indefinite = [], []
+        for band, its in zip(self._filled(entries), self._columns, strict=True):
+            factor, failed = _factorized(band)
+            if failed:
+                indefinite.append(self._piece[its][failed - 1])
             factors.append(factor)
-            first = end
+        if indefinite:
+            raise IndefiniteError(np.unique([*indefinite, *self._indefinite(entries)]))
 
         def solve(rhs):
             rest = rhs if self._order is None else rhs[self._order]
@@ -200,6 +203,37 @@ class _Bands:
             return result
 
         return solve
+
+    def _filled(self, entries):
+        """The bands, (w, k) each, as LAPACK has them."""
+        bands = np.zeros(self._length)
+        if self._twice is None:
+            bands[self._place] = entries
+        else:
+            np.add.at(bands, self._place, self._twice * entries)
+        lengths = [rows * (its.stop - its.start) for rows, its in zip(self._rows, self._columns, strict=True)]
+        parts = np.split(bands, np.cumsum(lengths[:-1]))
+        return [part.reshape(-1, rows).T for part, rows in zip(parts, self._rows, strict=True)]
+
+    def _indefinite(self, entries):
+        """The pieces whose matrices are not positive definite by themselves."""
+        for band, its in zip(self._filled(entries), self._columns, strict=True):
+            piece = self._piece[its]
+            ends = np.flatnonzero(np.diff(piece, append=-1)) + 1
+            for start, end in zip([0, *ends[:-1]], ends, strict=True):
+                _, failed = _factorized(np.asfortranarray(band[:, start:end]))
+                if failed:
+                    yield piece[start]
+
+
+def _factorized(band):
+    """The factor of a band, which is overwritten, and the number of the first column that stands in the way, or 0."""
+    if not band.size:
+        return band, 0
+    factor, failed = dpbtrf(band, lower=1, overwrite_ab=1)
+    if not failed and not np.isfinite(factor[0].sum()):  # LAPACK goes on where something is not a number
+        failed = int(np.argmin(np.isfinite(factor[0]))) + 1
+    return factor, failed
 
 
 def _solved(factor, rhs):

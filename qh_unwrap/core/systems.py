@@ -12,8 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .bands import Banded, are_narrow
-from .errors import SingularError
+from .bands import Banded, IndefiniteError, are_narrow
 from .factors import Factorizer, superlu
 from .patterns import Unknowns
 from .sparse import Sparse
@@ -93,10 +92,22 @@ class Constrained:
         return Constrained(self.order, self.edges, held, values, partner, self._group, self._factorizer)
 
     @cached_property
+    def _narrow(self) -> np.ndarray:
+        """(p,) bool, the pieces that are bands: what suits each depends on it alone, and not on its company."""
+        return are_narrow(self.order, self.edges, self._group)
+
+    @cached_property
     def _equations(self) -> list[Equations]:
-        """Those of all pieces whose matrices are symmetric and positive definite; what suits each depends on it alone,
-        and not on its company."""
-        narrow = are_narrow(self.order, self.edges, self._group)
+        """Those of all pieces, if their matrices are symmetric and positive definite."""
+        return self._apart(self._narrow)
+
+    @cached_property
+    def _everything(self) -> Sparse:
+        """Those of all pieces, whatever their matrices are."""
+        return self._sparse(np.ones(len(self.order), bool))
+
+    def _apart(self, narrow):
+        """Those of the `narrow` pieces, (p,) bool, and those of the others."""
         narrow = np.full(len(self.order), narrow[0]) if self._group is None else narrow[self._group]
         found: list[Equations] = []
         if narrow.any():
@@ -105,10 +116,15 @@ class Constrained:
             found.append(self._everything if not narrow.any() else self._sparse(~narrow))
         return found
 
-    @cached_property
-    def _everything(self) -> Sparse:
-        """Those of all pieces, whatever their matrices are."""
-        return self._sparse(np.ones(len(self.order), bool))
+    def _asked(self, ask):
+        """What each of the equations answers, and these; pieces that prove to be indefinite are asked another way."""
+        narrow, equations = self._narrow, self._equations
+        while True:
+            try:
+                return [ask(each) for each in equations], equations
+            except IndefiniteError as fault:
+                narrow = narrow & ~np.isin(np.arange(len(narrow)), fault.pieces)
+                equations = self._apart(narrow)
 
     def _sparse(self, chosen):
         return Sparse(self._unknowns_of(chosen), self.order, self.edges, self._group, self._factorizer)
@@ -165,12 +181,10 @@ class Constrained:
         return result
 
     def _solvers(self, forward, backward, own, exactly):
+        given = forward, backward, own, exactly
         if np.array_equal(forward, backward):
-            try:
-                return [each.solver(forward, backward, own, exactly) for each in self._equations]
-            except SingularError:  # or not positive definite, as where weights are negative
-                pass
-        return [self._everything.solver(forward, backward, own, exactly)]
+            return self._asked(lambda each: each.solver(*given))[0]
+        return [self._everything.solver(*given)]
 
     def newton_direction(
         self,
@@ -186,12 +200,8 @@ class Constrained:
         if self.held.all():
             return np.zeros(gradient.shape)
         given = gradient, beside, own, residual
-        self._last = self._equations
-        try:
-            return np.sum([each.newton_direction(*given) for each in self._last], axis=0)
-        except SingularError:  # or hardly positive definite
-            self._last = [self._everything]
-            return self._everything.newton_direction(*given)
+        found, self._last = self._asked(lambda each: each.newton_direction(*given))
+        return np.sum(found, axis=0)
 
     def next_direction(self, gradient: np.ndarray, residual: np.ndarray | float) -> np.ndarray:
         """The same for another gradient, with the Hessian that the last direction was for."""

@@ -3,8 +3,7 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core import Surface, bands
-from qh_unwrap.core.bands import Banded, are_narrow
-from qh_unwrap.core.errors import SingularError
+from qh_unwrap.core.bands import Banded, IndefiniteError, are_narrow
 from qh_unwrap.core.patterns import Unknowns
 from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.systems import Constrained
@@ -58,11 +57,35 @@ def test_matrices_that_are_not_positive_definite_are_solved_another_way(alike):
     beside, own, _ = random_blocks(surface.edges, n, 4)
     own[0][5] = 0.0  # so that the blocks at a vertex's own place are not positive definite
     gradient = np.random.default_rng(5).normal(size=(n, 2))
-    with pytest.raises(SingularError):
+    with pytest.raises(IndefiniteError):
         Banded(system.unknowns, surface.order, surface.edges).newton_direction(gradient, beside, own)
     one, other = system.newton_direction(gradient, beside, own, 1e-9), system.next_direction(gradient[::-1], 1e-9)
     for found in (one, other):
         assert np.isfinite(found).all() and not found[held].any() and found.any()
+
+
+def test_indefinite_pieces_leave_the_others_as_they_are():
+    meshes = [shapes.bump(k, inner=30, outer=12) for k in range(5)]
+    surface = Surface(*joined(*zip(*meshes, strict=True)))
+    n, piece = len(surface.vertices), surface.vertex_piece
+    held, values = np.isin(np.arange(n), surface.vertex_starts), np.random.default_rng(7).normal(size=(n, 2))
+    beside, own, _ = random_blocks(surface.edges, n, 8)
+    system = Constrained(surface.order, surface.edges, held, values, group=piece)
+    sound = system.newton_direction(values, beside, own, 1e-9)
+    weights = np.ones((2, len(surface.edges)))
+    solved = system.solve(weights)
+    bad = (piece == 1) | (piece == 3)
+    own[0] = np.where(bad, 0.0, own[0])
+    weights[:, bad[surface.edges[:, 0]]] = -1.0
+    for found, before in (
+        (system.newton_direction(values, beside, own, 1e-9), sound),
+        (system.solve(weights), solved),
+    ):
+        assert np.isfinite(found).all()
+        np.testing.assert_array_equal(found[~bad], before[~bad])
+    np.testing.assert_allclose(found[bad], solved[bad], atol=1e-9)  # the sign of all weights does not matter
+    other = system.next_direction(values[::-1], 1e-9)
+    assert np.isfinite(other).all() and other[~bad & ~held].all()
 
 
 def test_what_is_not_finite_is_not_solved():
@@ -72,5 +95,5 @@ def test_what_is_not_finite_is_not_solved():
     beside, own, _ = random_blocks(surface.edges, n, 6)
     for value in (np.nan, np.inf):
         own[0][7] = value
-        with pytest.raises(SingularError):
+        with pytest.raises(IndefiniteError):
             Banded(everything, surface.order, surface.edges).newton_direction(np.zeros((n, 2)), beside, own)
