@@ -13,8 +13,10 @@ import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 
 from .patterns import Unknowns, places
+from .threads import is_known, one_thread
 
 _WIDEST = 90  # places by which neighbours may be apart in the order of elimination
+_UNBLOCKED = 15  # the same where LAPACK may use more than one thread, which it does for wider bands
 
 
 class IndefiniteError(Exception):
@@ -42,7 +44,7 @@ def widths(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None
 
 def are_narrow(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
     """Which pieces are bands when eliminated in that `order` (n,), (p,) bool."""
-    return widths(order, edges, group) <= _WIDEST
+    return widths(order, edges, group) <= (_WIDEST if is_known() else min(_WIDEST, _UNBLOCKED))
 
 
 class Banded:
@@ -181,13 +183,14 @@ class _Bands:
         """
         entries = entries[self._entry]
         factors, indefinite = [], []
-        for band, its in zip(self._filled(entries), self._columns, strict=True):
-            factor, failed = _factorized(band)
-            if failed:
-                indefinite.append(self._piece[its][failed - 1])
-            factors.append(factor)
-        if indefinite:
-            raise IndefiniteError(np.unique([*indefinite, *self._indefinite(entries)]))
+        with one_thread():
+            for band, its in zip(self._filled(entries), self._columns, strict=True):
+                factor, failed = _factorized(band)
+                if failed:
+                    indefinite.append(self._piece[its][failed - 1])
+                factors.append(factor)
+            if indefinite:
+                raise IndefiniteError(np.unique([*indefinite, *self._indefinite(entries)]))
 
         def solve(rhs):
             rest = rhs if self._order is None else rhs[self._order]
