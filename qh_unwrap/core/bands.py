@@ -15,8 +15,11 @@ from scipy.linalg.lapack import dpbtrf, dpbtrs
 from .patterns import Unknowns, places
 from .threads import is_known, one_thread
 
-_WIDEST = 90  # places by which neighbours may be apart in the order of elimination
-_UNBLOCKED = 15  # the same where LAPACK may use more than one thread, which it does for wider bands
+# Widths depend on how vertices are numbered, so that as little as may be should depend on them: which pieces are small
+# does not.
+_FEW = 1000  # vertices of a piece, up to which its band takes less time than other ways,
+_WIDEST = 128  # unless neighbours are farther apart than so many places in the order of elimination
+_UNBLOCKED = 15  # places, up to which LAPACK certainly uses one thread
 
 
 class IndefiniteError(Exception):
@@ -27,12 +30,12 @@ class IndefiniteError(Exception):
         self.pieces = pieces
 
 
-def widths(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
-    """By how many places neighbours are apart at most in that `order` (n,), in every piece, (p,).
+def widths(place: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
+    """By how many places the ends of edges (k, 2) are apart at most, in every piece, (p,).
 
-    `group` (n,) is the piece of each vertex, None where there is one.
+    place  (n,), that of each vertex
+    group  (n,), the piece of each vertex, None where there is one
     """
-    place = places(order)
     i, j = edges.T
     apart = np.abs(place[i] - place[j])
     if group is None:
@@ -42,9 +45,15 @@ def widths(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None
     return result
 
 
-def are_narrow(order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
-    """Which pieces are bands when eliminated in that `order` (n,), (p,) bool."""
-    return widths(order, edges, group) <= (_WIDEST if is_known() else min(_WIDEST, _UNBLOCKED))
+def are_small(n: int, group: np.ndarray | None = None) -> np.ndarray:
+    """Which pieces have few vertices, (p,) bool, of n in all."""
+    return (np.array([n]) if group is None else np.bincount(group)) <= _FEW
+
+
+def are_narrow(place: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
+    """Which pieces are to be taken for bands when their vertices have these places, (p,) bool."""
+    widest = _WIDEST if is_known() else min(_WIDEST, _UNBLOCKED)
+    return are_small(len(place), group) & (widths(place, edges, group) <= widest)
 
 
 class Banded:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .air import Air, Triangulator, make_air, quality
-from .bands import are_narrow
+from .bands import are_small
 from .certificate import orientation
 from .chart import Chart, Surface, air_chart
 from .ordering import elimination_order, local_order
@@ -355,7 +355,7 @@ class Plane:
         sides = np.bincount(island.loop_piece, [len(loop) for loop in island.loops])
         short = sides**2 <= _SHORT * np.diff(island.vertex_starts, append=n)
         order = island.order
-        serves = pieces & short & ~are_narrow(order, island.edges, island.vertex_piece)
+        serves = pieces & short & ~are_small(n, island.vertex_piece)
         order = order[serves[piece[order]]]
         for chosen in (serves[piece] & (np.arange(len(piece)) >= n), (pieces & ~serves)[piece]):
             rows, number = np.flatnonzero(chosen), np.cumsum(chosen) - 1

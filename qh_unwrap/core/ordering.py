@@ -38,9 +38,9 @@ def local_order(n: int, edges: np.ndarray, group: np.ndarray | None = None) -> n
     piece = np.zeros(n, np.int64) if group is None else group
     given = np.argsort(piece, kind="stable")  # one piece after the other
     near = _banded(n, edges, piece)
-    one, other = (widths(order, edges, group) for order in (given, near))
+    one, other = (widths(places(order), edges, group) for order in (given, near))
     near = np.where((one < other)[piece[given]], given, near)  # as grids are often numbered row by row
-    narrow = are_narrow(near, edges, group)[piece]
+    narrow = are_narrow(places(near), edges, group)[piece]
     if narrow.all():
         return near
     near, wide = near[narrow[near]], near[~narrow[near]]

@@ -14,7 +14,7 @@ import numpy as np
 
 from .bands import Banded, IndefiniteError, are_narrow
 from .factors import Factorizer, superlu
-from .patterns import Unknowns
+from .patterns import Unknowns, places
 from .sparse import Sparse
 
 
@@ -94,7 +94,12 @@ class Constrained:
     @cached_property
     def _narrow(self) -> np.ndarray:
         """(p,) bool, the pieces that are bands: what suits each depends on it alone, and not on its company."""
-        return are_narrow(self.order, self.edges, self._group)
+        place, edges = places(self.order), self.edges
+        if any(unknowns.tied for unknowns in self.unknowns):  # which brings together what is far apart
+            u, v = self.unknowns[0].leader, self.unknowns[-1].leader
+            pairs = [(one[edges[:, 0]], other[edges[:, 1]]) for one in (u, v) for other in (u, v)]
+            edges = np.hstack([*pairs, (u, v)]).T
+        return are_narrow(place, edges, self._group)
 
     @cached_property
     def _equations(self) -> list[Equations]:
@@ -104,16 +109,23 @@ class Constrained:
     @cached_property
     def _everything(self) -> Sparse:
         """Those of all pieces, whatever their matrices are."""
-        return self._sparse(np.ones(len(self.order), bool))
+        return self._sparse(np.ones(len(self.order), bool), self.alike)
 
     def _apart(self, narrow):
-        """Those of the `narrow` pieces, (p,) bool, and those of the others."""
-        narrow = np.full(len(self.order), narrow[0]) if self._group is None else narrow[self._group]
+        """Those of the `narrow` pieces, (p,) bool, and those of the others that are free in U and V alike, or not."""
+        alike = np.ones(len(narrow), bool)
+        if not self.alike:
+            u, v = self.unknowns
+            differs = (u.held != v.held) | (u.leader != v.leader)
+            alike[0 if self._group is None else self._group[differs]] = False
         found: list[Equations] = []
         if narrow.any():
-            found.append(Banded(self._unknowns_of(narrow), self.order, self.edges, self._group))
-        if not narrow.all():
-            found.append(self._everything if not narrow.any() else self._sparse(~narrow))
+            found.append(Banded(self._unknowns_of(self._at(narrow), self.alike), self.order, self.edges, self._group))
+        for chosen, is_alike in ((~narrow & alike, True), (~narrow & ~alike, False)):
+            if chosen.all() and is_alike == self.alike:
+                found.append(self._everything)
+            elif chosen.any():
+                found.append(self._sparse(self._at(chosen), is_alike))
         return found
 
     def _asked(self, ask):
@@ -126,14 +138,19 @@ class Constrained:
                 narrow = narrow & ~np.isin(np.arange(len(narrow)), fault.pieces)
                 equations = self._apart(narrow)
 
-    def _sparse(self, chosen):
-        return Sparse(self._unknowns_of(chosen), self.order, self.edges, self._group, self._factorizer)
+    def _at(self, pieces):
+        """The values (p,) of the pieces at their vertices, (n,)."""
+        return np.full(len(self.order), pieces[0]) if self._group is None else pieces[self._group]
 
-    def _unknowns_of(self, chosen):
-        """The unknowns at the chosen vertices (n,) bool, those of whole pieces."""
-        if chosen.all():
+    def _sparse(self, chosen, alike):
+        return Sparse(self._unknowns_of(chosen, alike), self.order, self.edges, self._group, self._factorizer)
+
+    def _unknowns_of(self, chosen, alike):
+        """The unknowns at the chosen vertices (n,) bool, those of whole pieces, of both coordinates if they are `alike`
+        there, else of each."""
+        if chosen.all() and alike == self.alike:
             return self.unknowns
-        each = zip(self.unknowns, self._partners, strict=False)
+        each = list(zip(self.unknowns, self._partners, strict=False))[: 1 if alike else 2]
         return [Unknowns(self.order, unknowns.held | ~chosen, partner) for unknowns, partner in each]
 
     @property

@@ -88,7 +88,7 @@ def test_air_needs_triangles_with_all_sides():
 
 def test_behind_a_short_outline_the_islands_own_order_serves_on(monkeypatch):
     monkeypatch.setattr(bands, "_WIDEST", -1)
-    meshes = [shapes.bump(1, inner=900, outer=20), shapes.bump(2, inner=100, outer=40)]
+    meshes = [shapes.bump(1, inner=1100, outer=20), shapes.bump(2, inner=100, outer=40)]
     surface = Surface(*joined(*zip(*meshes, strict=True)))
     uv = surface.vertices[:, :2] + 9 * surface.vertex_piece[:, None]
     plane = Plane(surface, uv, Fixed(np.zeros(uv.shape, bool), uv), airs_around(surface, uv, triangulate), triangulate)

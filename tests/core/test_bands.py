@@ -4,7 +4,7 @@ import pytest
 
 from qh_unwrap.core import Surface, bands
 from qh_unwrap.core.bands import Banded, IndefiniteError, are_narrow
-from qh_unwrap.core.patterns import Unknowns
+from qh_unwrap.core.patterns import Unknowns, places
 from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.systems import Constrained
 
@@ -19,11 +19,11 @@ def ribbon_and_sheet():
 def test_what_is_narrow_does_not_depend_on_its_company(monkeypatch):
     monkeypatch.setattr(bands, "_WIDEST", 6)
     surface = ribbon_and_sheet()
-    narrow = are_narrow(surface.order, surface.edges, surface.vertex_piece)
+    narrow = are_narrow(places(surface.order), surface.edges, surface.vertex_piece)
     assert narrow.tolist() == [True, False]
     for k in (0, 1):
         alone = surface.one(k)
-        assert (are_narrow(alone.order, alone.edges) == (k == 0)).all()
+        assert (are_narrow(places(alone.order), alone.edges) == (k == 0)).all()
 
 
 def test_pieces_are_solved_in_company_as_they_are_alone(monkeypatch):
@@ -62,6 +62,41 @@ def test_matrices_that_are_not_positive_definite_are_solved_another_way(alike):
     one, other = system.newton_direction(gradient, beside, own, 1e-9), system.next_direction(gradient[::-1], 1e-9)
     for found in (one, other):
         assert np.isfinite(found).all() and not found[held].any() and found.any()
+
+
+def test_what_is_tied_to_something_far_away_is_no_band(monkeypatch):
+    monkeypatch.setattr(bands, "_WIDEST", 6)
+    made = []
+    monkeypatch.setattr(bands._Bands, "factorized", lambda *given: made.append(given) or (lambda rhs: rhs))
+    surface = ribbon_and_sheet()
+    n = len(surface.vertices)
+    held, (beside, own, _) = np.arange(n) % 60 == 0, random_blocks(surface.edges, n, 1)
+    for tied in (None, 0, 1):
+        partner = np.column_stack([np.arange(n), np.arange(n)])
+        if tied is not None:  # the ends of the ribbon
+            partner[[1, 58], tied] = 58, 1
+        system = Constrained(surface.order, surface.edges, held, np.zeros((n, 2)), partner, surface.vertex_piece)
+        made.clear()
+        system.newton_direction(np.ones((n, 2)), beside, own, 1e-3)
+        assert len(made) == (tied is None)
+
+
+def test_who_is_held_in_one_coordinate_alone_changes_no_others_equations(monkeypatch):
+    monkeypatch.setattr(bands, "_WIDEST", -1)
+    surface = ribbon_and_sheet()
+    n = len(surface.vertices)
+    held = np.zeros((n, 2), bool)
+    held[surface.vertex_starts] = True
+    beside, own, _ = random_blocks(surface.edges, n, 2)
+    gradient = np.random.default_rng(3).normal(size=(n, 2))
+    found = []
+    for also in (held[7, 0], True):
+        held[7, 0] = also
+        system = Constrained(surface.order, surface.edges, held, np.zeros((n, 2)), group=surface.vertex_piece)
+        found.append(system.newton_direction(gradient, beside, own, 0.1))
+        found.append(system.next_direction(gradient, 0.1))
+    for one, other in zip(found[:2], found[2:], strict=True):
+        np.testing.assert_allclose(one[surface.vertex_piece == 1], other[surface.vertex_piece == 1], rtol=1e-12)
 
 
 def test_indefinite_pieces_leave_the_others_as_they_are():

@@ -4,12 +4,15 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import splu
 
-from qh_unwrap.core import Surface, ordering
-from qh_unwrap.core.bands import widths
+from qh_unwrap.core import Surface, bands, ordering, patterns
 from qh_unwrap.core.ordering import elimination_order
 from qh_unwrap.core.pieces import joined
 
 from . import shapes
+
+
+def widths_of(order, *graph):
+    return bands.widths(patterns.places(order), *graph)
 
 
 def fill(surface, order=None):
@@ -60,7 +63,7 @@ def test_each_grid_is_eliminated_row_by_row_if_it_is_numbered_so():
     number = np.random.default_rng(0).permutation(len(vertices))
     shuffled = vertices[np.argsort(number)], number[triangles]
     surface = Surface(*joined(*zip((vertices, triangles), shuffled, (vertices, triangles), strict=True)))
-    first, second, third = widths(surface.order, surface.edges, surface.vertex_piece)
+    first, second, third = widths_of(surface.order, surface.edges, surface.vertex_piece)
     assert first == third == 18 < second < 40
 
 
@@ -90,10 +93,10 @@ def test_orders_of_graphs_that_fall_into_parts():
     edges = np.array([[0, 3], [1, 4], [4, 7], [2, 5], [5, 8]])  # and 6 has no neighbour
     order = ordering.local_order(9, edges)
     assert sorted(order.tolist()) == list(range(9))
-    assert widths(order, edges)[0] == 1
+    assert widths_of(order, edges)[0] == 1
     piece = np.arange(9) % 3
     order = ordering.local_order(9, edges, piece)
-    assert (np.diff(piece[order]) >= 0).all() and widths(order, edges)[0] == 1
+    assert (np.diff(piece[order]) >= 0).all() and widths_of(order, edges)[0] == 1
 
 
 def test_some_pieces_are_eliminated_as_all_are():
