@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Equations of pieces so narrow that their matrices are bands.
+"""Equations of pieces so small that their matrices are narrow bands.
 
 LAPACK factorizes both coordinates' equations at once and exactly, in less time than it takes to come near their
 solution in any other way.
