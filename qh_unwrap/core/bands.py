@@ -8,11 +8,12 @@ solution in any other way.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 
-from .patterns import Unknowns, places
+from .patterns import Unknowns, places, solved_each
 from .threads import is_known, one_thread
 
 # Widths depend on how vertices are numbered, so that as little as may be should depend on them: which pieces are small
@@ -38,10 +39,14 @@ def widths(place: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None
     """
     i, j = edges.T
     apart = np.abs(place[i] - place[j])
-    if group is None:
-        return np.array([apart.max(initial=0)])
+    return np.array([apart.max(initial=0)]) if group is None else _largest(apart, i, group)
+
+
+def _largest(values, at, group):
+    """The largest of values (k,), not negative, in every group, (g,): they stand `at` such members, (k,), and `group`
+    (n,) is that of each member."""
     result = np.zeros(int(group.max(initial=0)) + 1, np.int64)
-    np.maximum.at(result, group[i], apart)
+    np.maximum.at(result, group[at], values)
     return result
 
 
@@ -50,10 +55,9 @@ def are_small(n: int, group: np.ndarray | None = None) -> np.ndarray:
     return (np.array([n]) if group is None else np.bincount(group)) <= _FEW
 
 
-def are_narrow(place: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None) -> np.ndarray:
-    """Which pieces are to be taken for bands when their vertices have these places, (p,) bool."""
-    widest = _WIDEST if is_known() else min(_WIDEST, _UNBLOCKED)
-    return are_small(len(place), group) & (widths(place, edges, group) <= widest)
+def are_narrow(width: np.ndarray, n: int, group: np.ndarray | None = None) -> np.ndarray:
+    """Which pieces of such widths, (p,), are to be taken for bands, (p,) bool, of n vertices in all."""
+    return are_small(n, group) & (width <= (_WIDEST if is_known() else min(_WIDEST, _UNBLOCKED)))
 
 
 class Banded:
@@ -70,7 +74,8 @@ class Banded:
     def __init__(
         self, unknowns: Sequence[Unknowns], order: np.ndarray, edges: np.ndarray, group: np.ndarray | None = None
     ):
-        self._unknowns, self._order, self._edges, self._group = unknowns, order, edges, group
+        self._unknowns, self._order, self._edges = unknowns, order, edges
+        self._group = np.zeros(len(order), np.int64) if group is None else group
         self._coupled: _Bands | None = None  # of both coordinates' equations,
         self._single: list[_Bands] = []  # and of each coordinate's by themselves
         self._solve: Callable[[np.ndarray], np.ndarray] | None = None
@@ -80,7 +85,7 @@ class Banded:
         gradient: np.ndarray,
         beside: Sequence[np.ndarray],
         own: Sequence[np.ndarray],
-        residual: np.ndarray | float = 0.0,
+        residual: np.ndarray | float,
     ) -> np.ndarray:
         if self._coupled is None:
             self._coupled = self._both_coupled()
@@ -89,7 +94,7 @@ class Banded:
         self._solve = self._coupled.factorized(entries)
         return self.next_direction(gradient, residual)
 
-    def next_direction(self, gradient: np.ndarray, _residual: np.ndarray | float = 0.0) -> np.ndarray:
+    def next_direction(self, gradient: np.ndarray, _residual: np.ndarray | float) -> np.ndarray:
         assert self._solve is not None
         direction, rest = np.zeros(gradient.shape), np.empty(sum(len(one) for one in self._of_both))
         for which, unknowns, values in zip(self._which, self._of_both, gradient.T, strict=True):
@@ -100,19 +105,12 @@ class Banded:
         return direction
 
     def solver(
-        self, forward: np.ndarray, _backward: np.ndarray, own: np.ndarray, _exactly: bool = True
+        self, forward: np.ndarray, _backward: np.ndarray, own: np.ndarray, _exactly: bool
     ) -> Callable[[np.ndarray, np.ndarray], None]:
         if not self._single:
             self._single = [self._alone(unknowns) for unknowns in self._unknowns]
         entries = np.concatenate([forward, own])
-        solves = [bands.factorized(entries) for bands in self._single]
-
-        def solve(sources, values):
-            each = [slice(None)] if len(solves) == 1 else [slice(0, 1), slice(1, 2)]
-            for columns, unknowns, one in zip(each, self._unknowns, solves, strict=True):
-                unknowns.spread(one(unknowns.gathered(sources[:, columns])), values[:, columns])
-
-        return solve
+        return solved_each(self._unknowns, [bands.factorized(entries) for bands in self._single])
 
     @property
     def _of_both(self):
@@ -130,23 +128,21 @@ class Banded:
             there[np.concatenate(at)] = True
             number, size = np.cumsum(there) - 1, int(there.sum())
             self._which = tuple(number[each] for each in at)
-        everything, piece = np.arange(size), None if self._group is None else np.empty(size, np.int64)
+        everything, piece = np.arange(size), np.empty(size, np.int64)
         at_vertices = []
         for which, unknowns in zip(self._which, self._of_both, strict=True):
-            if piece is not None:
-                piece[which] = self._group[unknowns.sequence]
+            piece[which] = self._group[unknowns.sequence]
             at_vertices.append(np.append(everything[which], -1)[unknowns.number])
         (ui, uj), (vi, vj) = (number[self._edges.T] for number in at_vertices)
         u, v = at_vertices
         row, column = np.concatenate([ui, ui, vi, vi, u, u, v]), np.concatenate([uj, vj, uj, vj, u, v, v])
         tied = any(unknowns.tied for unknowns in self._unknowns)
-        return _Bands(row, column, size, piece, 4 * len(self._edges) if tied else 0)
+        return _Bands(row, column, piece, 4 * len(self._edges) if tied else 0)
 
     def _alone(self, unknowns):
         i, j = unknowns.number[self._edges.T]
         row, column = np.concatenate([i, unknowns.number]), np.concatenate([j, unknowns.number])
-        piece = None if self._group is None else self._group[unknowns.sequence]
-        return _Bands(row, column, len(unknowns), piece, len(self._edges) if unknowns.tied else 0)
+        return _Bands(row, column, self._group[unknowns.sequence], len(self._edges) if unknowns.tied else 0)
 
 
 class _Bands:
@@ -155,34 +151,28 @@ class _Bands:
     Parameters
     ----------
     row, column : (e,), the unknowns that every entry joins, in either order; -1 for what is no unknown
-    size : the number of unknowns
-    piece : (size,), the piece that each belongs to, one after the other; None where there is one
+    piece : (size,), the piece that each unknown belongs to, one after the other
     twice : so many first entries stand for a second one, in the same place if they join an unknown to itself, which
         they do only where some move together
     """
 
-    def __init__(self, row: np.ndarray, column: np.ndarray, size: int, piece: np.ndarray | None, twice: int):
+    def __init__(self, row: np.ndarray, column: np.ndarray, piece: np.ndarray, twice: int):
         self._entry = entry = np.flatnonzero((row >= 0) & (column >= 0))
         low, gap = np.minimum(row[entry], column[entry]), np.abs(row[entry] - column[entry])
         self._twice = np.where((entry < twice) & (gap == 0), 2.0, 1.0) if twice else None
-        self._order, self._piece = None, np.zeros(size, np.int64) if piece is None else piece
-        if piece is None or not size:
-            ends, widths = [size], [int(gap.max(initial=0))]
-        else:
-            run = np.cumsum(np.diff(piece, prepend=piece[0]) != 0)
-            width = np.zeros(run[-1] + 1, np.int64)
-            np.maximum.at(width, run[low], gap)
-            kind = np.frexp(width)[1][run]  # of one kind are those up to the same power of two
-            self._order = np.argsort(kind, kind="stable")
+        width = _largest(gap, low, piece)
+        kind = np.frexp(width)[1]  # of one kind are those up to the same power of two
+        count = np.bincount(kind[piece], minlength=1)
+        there = np.flatnonzero(count)
+        self._order, self._piece = None, piece
+        if len(there) > 1:
+            self._order = np.argsort(kind[piece], kind="stable")
             self._piece = piece[self._order]
             low = places(self._order)[low]
-            count = np.bincount(kind)
-            there = np.flatnonzero(count)
-            ends = np.cumsum(count[there]).tolist()
-            widths = [int(width[run[kind == each]].max()) for each in there.tolist()]
-        self._columns = [slice(*both) for both in zip([0, *ends[:-1]], ends, strict=True)]
-        self._rows = [width + 1 for width in widths]
-        height = np.repeat(self._rows, [its.stop - its.start for its in self._columns])
+        ends = np.cumsum(count[there]).tolist()
+        self._columns = [slice(*both) for both in pairwise([0, *ends])]
+        self._rows = [int(width[kind == each].max()) + 1 for each in there.tolist()]
+        height = np.repeat(np.array(self._rows, np.int64), count[there])
         self._length, self._place = int(height.sum()), (np.cumsum(height) - height)[low] + gap
 
     def factorized(self, entries: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
@@ -202,16 +192,11 @@ class _Bands:
                 raise IndefiniteError(np.unique([*indefinite, *self._indefinite(entries)]))
 
         def solve(rhs):
-            rest = rhs if self._order is None else rhs[self._order]
-            if len(factors) == 1:
-                solution = _solved(factors[0], rest)
-            else:
-                parts = [_solved(factor, rest[its]) for factor, its in zip(factors, self._columns, strict=True)]
-                solution = np.concatenate(parts)
             if self._order is None:
-                return solution
+                return _solved(factors[0], rhs) if factors else rhs
             result = np.empty(rhs.shape)
-            result[self._order] = solution
+            for factor, its in zip(factors, self._columns, strict=True):
+                result[self._order[its]] = _solved(factor, rhs[self._order[its]])
             return result
 
         return solve
@@ -224,15 +209,15 @@ class _Bands:
         else:
             np.add.at(bands, self._place, self._twice * entries)
         lengths = [rows * (its.stop - its.start) for rows, its in zip(self._rows, self._columns, strict=True)]
-        parts = np.split(bands, np.cumsum(lengths[:-1]))
-        return [part.reshape(-1, rows).T for part, rows in zip(parts, self._rows, strict=True)]
+        ends = pairwise([0, *np.cumsum(lengths).tolist()])
+        return [bands[slice(*both)].reshape(-1, rows).T for both, rows in zip(ends, self._rows, strict=True)]
 
     def _indefinite(self, entries):
         """The pieces whose matrices are not positive definite by themselves."""
         for band, its in zip(self._filled(entries), self._columns, strict=True):
             piece = self._piece[its]
             ends = np.flatnonzero(np.diff(piece, append=-1)) + 1
-            for start, end in zip([0, *ends[:-1]], ends, strict=True):
+            for start, end in pairwise([0, *ends.tolist()]):
                 _, failed = _factorized(np.asfortranarray(band[:, start:end]))
                 if failed:
                     yield piece[start]
@@ -240,8 +225,6 @@ class _Bands:
 
 def _factorized(band):
     """The factor of a band, which is overwritten, and the number of the first column that stands in the way, or 0."""
-    if not band.size:
-        return band, 0
     factor, failed = dpbtrf(band, lower=1, overwrite_ab=1)
     if not failed and not np.isfinite(factor[0].sum()):  # LAPACK goes on where something is not a number
         failed = int(np.argmin(np.isfinite(factor[0]))) + 1
@@ -249,4 +232,4 @@ def _factorized(band):
 
 
 def _solved(factor, rhs):
-    return dpbtrs(factor, rhs, lower=1)[0] if len(rhs) else rhs
+    return dpbtrs(factor, rhs, lower=1)[0]

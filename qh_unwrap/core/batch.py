@@ -13,9 +13,10 @@ from .boundary import outer_loop
 from .certificate import enclosed_area
 from .chart import Surface, normalised_pieces
 from .distortion import checked_uv
-from .domain import Fixed, Walls
+from .domain import Fixed
 from .errors import PinError, ShapeError, UnwrapError, UVError
 from .pieces import joined
+from .plane import Walls
 from .report import Result, Shape
 from .settings import Settings
 from .topology import Topology, checked_arrays

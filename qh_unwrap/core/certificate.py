@@ -17,7 +17,7 @@ from .triangles import by_parts, corners_of
 if TYPE_CHECKING:
     from .chart import Chart, Surface
 
-_ROUNDING = 1e-15  # largest rounding error of a difference of two products, relative to these (Shewchuk 1997)
+ROUNDING = 1e-15  # largest rounding error of a difference of two products, relative to these (Shewchuk 1997)
 _CROWDED = 30  # pairs that lie side by side for each box, from which on strips pay
 _MOST = 1_000_000  # strips of all groups, that rounding can tell apart
 _PORTION = 100_000  # pairs of boxes that are looked at together, about: it bounds the memory
@@ -57,7 +57,7 @@ def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     (n,)."""
     (bx, by), (cx, cy) = (b - a).T, (c - a).T
     first, second = bx * cy, by * cx
-    apart, error = first - second, _ROUNDING * (np.abs(first) + np.abs(second))
+    apart, error = first - second, ROUNDING * (np.abs(first) + np.abs(second))
     result = (apart > error).astype(np.int8)
     result -= apart < -error
     if not result.all():

@@ -13,11 +13,12 @@ from .batch import Batch
 from .boundary import held_outlines
 from .certificate import certified_pieces, wrong_pieces
 from .chart import Surface
-from .domain import Fixed, Plane, airs_around, loose, outlined, rigid
+from .domain import Fixed, loose, outlined, rigid
 from .energy import ISOMETRIC, energies
 from .errors import SingularError
 from .improvement import D, Group, Improvement, Steps
 from .pins import lead, way_of
+from .plane import Plane, airs_around
 from .settings import Settings
 from .starts import before_pins, best_start, natural_start, start_within, with_pins
 from .stepping import PART, STEP

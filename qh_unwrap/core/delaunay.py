@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay, QhullError
 
-from .certificate import turn, turn_of_whole_numbers
+from .certificate import ROUNDING, turn, turn_of_whole_numbers
 from .pieces import among
 
 _JOGGLE = 1e-11  # how far Qhull's points are moved, relative to their extent: many on one circle would take it longer
-_ROUNDING = 1e-15  # largest rounding error of `turn`, relative to its terms (Shewchuk 1997, with a margin)
 _CIRCLE_ROUNDING = 1.2e-15  # largest rounding error of `_in_circle`, relative to its terms
 
 
@@ -222,7 +221,7 @@ class _Mesh:
         second = (y[b] - ay) * (x[c] - ax)
         apart = first - second
         # Differences of numbers are 0 only if these are equal; so there rounding decides nothing.
-        if abs(apart) > _ROUNDING * (abs(first) + abs(second)) or first == 0 or second == 0:
+        if abs(apart) > ROUNDING * (abs(first) + abs(second)) or first == 0 or second == 0:
             return apart
         return turn_of_whole_numbers((ax, ay), (x[b], y[b]), (x[c], y[c]))
 

@@ -40,7 +40,7 @@ def local_order(n: int, edges: np.ndarray, group: np.ndarray | None = None) -> n
     near = _banded(n, edges, piece)
     one, other = (widths(places(order), edges, group) for order in (given, near))
     near = np.where((one < other)[piece[given]], given, near)  # as grids are often numbered row by row
-    narrow = are_narrow(places(near), edges, group)[piece]
+    narrow = are_narrow(np.minimum(one, other), n, group)[piece]
     if narrow.all():
         return near
     near, wide = near[narrow[near]], near[~narrow[near]]

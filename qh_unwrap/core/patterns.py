@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 
 import numpy as np
@@ -142,3 +142,18 @@ def places(order: np.ndarray) -> np.ndarray:
     place = np.empty(len(order), np.int64)
     place[order] = np.arange(len(order))
     return place
+
+
+def solved_each(
+    unknowns: Sequence[Unknowns], solves: Sequence[Callable[[np.ndarray], np.ndarray]]
+) -> Callable[[np.ndarray, np.ndarray], None]:
+    """A function of right-hand sides (n, c) and values (n, c) that adds to these what `solves` makes of those: one
+    function of the unknowns of both coordinates, or one of those of each."""
+
+    def solve(sources, values):
+        each = [slice(None)] if len(unknowns) == 1 else [slice(0, 1), slice(1, 2)]
+        for columns, its, one in zip(each, unknowns, solves, strict=True):
+            if len(its):
+                its.spread(one(its.gathered(sources[:, columns])), values[:, columns])
+
+    return solve

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import bsr_array
 
 from .factors import Factorizer, Factors
-from .patterns import Pattern, Unknowns
+from .patterns import Pattern, Unknowns, solved_each
 
 _STEPS = 100  # of conjugate gradients, at most
 # Of one piece; islands that go together with others have fewer unknowns.
@@ -39,7 +39,7 @@ class Sparse:
     ):
         self._unknowns, self._order, self._edges, self._group = unknowns, order, edges, group
         self._factorizer, self._alike = factorizer, len(unknowns) == 1
-        self.patterns = [Pattern(each, edges) for each in unknowns]
+        self._patterns = [Pattern(each, edges) for each in unknowns]
         self._mean: list[Factors] | None = None  # those of the last equations,
         self._serves_on = False  # and whether they may do for the next,
         self._product: Callable[[np.ndarray], np.ndarray] | None = None  # and their Hessian
@@ -48,26 +48,13 @@ class Sparse:
 
     def _is_alone(self, size):
         """Whether there is one piece only, of that many unknowns: what suits large ones must not depend on company."""
-        return self._group is None and self.patterns[0].size >= size
+        return self._group is None and self._patterns[0].size >= size
 
     def solver(
-        self, forward: np.ndarray, backward: np.ndarray, own: np.ndarray, exactly: bool = True
+        self, forward: np.ndarray, backward: np.ndarray, own: np.ndarray, exactly: bool
     ) -> Callable[[np.ndarray, np.ndarray], None]:
-        single = self._is_alone(_LARGE)
-        factors = [
-            self._factorizer(pattern.matrix(forward, backward, own), single) if pattern.size else None
-            for pattern in self.patterns
-        ]
-
-        def solve(sources, values):
-            each = [slice(None)] if self._alike else [slice(0, 1), slice(1, 2)]
-            for columns, unknowns, its in zip(each, self._unknowns, factors, strict=True):
-                if its is not None:
-                    rest = unknowns.gathered(sources[:, columns])
-                    solution = its.solve_exactly(rest) if exactly else its.solve(rest)
-                    unknowns.spread(solution, values[:, columns])
-
-        return solve
+        factors = [self._factorized(c, forward, backward, own) for c in range(len(self._unknowns))]
+        return solved_each(self._unknowns, [each.solve_exactly if exactly else each.solve for each in factors])
 
     def newton_direction(
         self,
@@ -120,17 +107,17 @@ class Sparse:
 
     def _preconditioner(self, c, beside, own):
         """The factors of one coordinate's own matrix; of both, if they are alike, the mean's."""
-        m, d = (beside[0], own[0]), (beside[1], own[1])
-        if not self._alike:
-            sign = 1 - 2 * c
-            m = m[0] + sign * d[0], m[1] + sign * d[1]
-        beside, own = m
-        return self._factorizer(self.patterns[c].matrix(beside, beside, own), self._is_alone(_LARGE))
+        sign = 0 if self._alike else 1 - 2 * c
+        m, d = beside[0] + sign * beside[1], own[0] + sign * own[1]
+        return self._factorized(c, m, m, d)
+
+    def _factorized(self, c, forward, backward, own):
+        return self._factorizer(self._patterns[c].matrix(forward, backward, own), self._is_alone(_LARGE))
 
     def _hessian(self, beside: Sequence[np.ndarray], own: Sequence[np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
         """The product of the Hessian with values of the unknowns, shaped as these."""
         if self._alike and not self._unknowns[0].tied:
-            matrix = self._matrix = self.patterns[0].block_matrix(beside, own, self._matrix)
+            matrix = self._matrix = self._patterns[0].block_matrix(beside, own, self._matrix)
             return lambda values: (matrix @ values.ravel()).reshape(values.shape)
         # What is not free in both coordinates alike has no blocks: multiply with those of all vertices.
         if self._all is None:

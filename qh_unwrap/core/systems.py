@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .bands import Banded, IndefiniteError, are_narrow
+from .bands import Banded, IndefiniteError, are_narrow, widths
 from .factors import Factorizer, superlu
 from .patterns import Unknowns, places
 from .sparse import Sparse
@@ -99,7 +99,7 @@ class Constrained:
             u, v = self.unknowns[0].leader, self.unknowns[-1].leader
             pairs = [(one[edges[:, 0]], other[edges[:, 1]]) for one in (u, v) for other in (u, v)]
             edges = np.hstack([*pairs, (u, v)]).T
-        return are_narrow(place, edges, self._group)
+        return are_narrow(widths(place, edges, self._group), len(place), self._group)
 
     @cached_property
     def _equations(self) -> list[Equations]:

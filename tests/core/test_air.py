@@ -6,8 +6,9 @@ from qh_unwrap.core import Settings, Surface, bands, distortion, errors, unwrap
 from qh_unwrap.core.air import _within, make_air
 from qh_unwrap.core.certificate import is_injective
 from qh_unwrap.core.delaunay import triangulate
-from qh_unwrap.core.domain import Fixed, Plane, airs_around
+from qh_unwrap.core.domain import Fixed
 from qh_unwrap.core.pieces import joined
+from qh_unwrap.core.plane import Plane, airs_around
 from qh_unwrap.core.triangles import signed_areas
 from qh_unwrap.core.weights import scheme
 

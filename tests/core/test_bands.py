@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core import Surface, bands
-from qh_unwrap.core.bands import Banded, IndefiniteError, are_narrow
+from qh_unwrap.core.bands import Banded, IndefiniteError, are_narrow, widths
 from qh_unwrap.core.patterns import Unknowns, places
 from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.systems import Constrained
@@ -16,14 +16,17 @@ def ribbon_and_sheet():
     return Surface(*joined(*zip(shapes.grid(60, 1), shapes.grid(12, 12), strict=True)))
 
 
+def narrow_pieces(surface, group=None):
+    return are_narrow(widths(places(surface.order), surface.edges, group), len(surface.vertices), group)
+
+
 def test_what_is_narrow_does_not_depend_on_its_company(monkeypatch):
     monkeypatch.setattr(bands, "_WIDEST", 6)
     surface = ribbon_and_sheet()
-    narrow = are_narrow(places(surface.order), surface.edges, surface.vertex_piece)
-    assert narrow.tolist() == [True, False]
+    assert narrow_pieces(surface, surface.vertex_piece).tolist() == [True, False]
     for k in (0, 1):
         alone = surface.one(k)
-        assert (are_narrow(places(alone.order), alone.edges) == (k == 0)).all()
+        assert (narrow_pieces(alone) == (k == 0)).all()
 
 
 def test_pieces_are_solved_in_company_as_they_are_alone(monkeypatch):
@@ -58,7 +61,7 @@ def test_matrices_that_are_not_positive_definite_are_solved_another_way(alike):
     own[0][5] = 0.0  # so that the blocks at a vertex's own place are not positive definite
     gradient = np.random.default_rng(5).normal(size=(n, 2))
     with pytest.raises(IndefiniteError):
-        Banded(system.unknowns, surface.order, surface.edges).newton_direction(gradient, beside, own)
+        Banded(system.unknowns, surface.order, surface.edges).newton_direction(gradient, beside, own, 0.0)
     one, other = system.newton_direction(gradient, beside, own, 1e-9), system.next_direction(gradient[::-1], 1e-9)
     for found in (one, other):
         assert np.isfinite(found).all() and not found[held].any() and found.any()
@@ -131,4 +134,4 @@ def test_what_is_not_finite_is_not_solved():
     for value in (np.nan, np.inf):
         own[0][7] = value
         with pytest.raises(IndefiniteError):
-            Banded(everything, surface.order, surface.edges).newton_direction(np.zeros((n, 2)), beside, own)
+            Banded(everything, surface.order, surface.edges).newton_direction(np.zeros((n, 2)), beside, own, 0.0)

@@ -10,10 +10,11 @@ from qh_unwrap.core import Settings, Surface, descent, distortion, unwrap
 from qh_unwrap.core.certificate import wrong_pieces
 from qh_unwrap.core.delaunay import triangulate
 from qh_unwrap.core.descent import Descent
-from qh_unwrap.core.domain import Fixed, Held, Plane, airs_around, loose
+from qh_unwrap.core.domain import Fixed, Held, loose
 from qh_unwrap.core.energy import Barrier, energies, map_scale
 from qh_unwrap.core.flattening import conformal
 from qh_unwrap.core.pieces import joined
+from qh_unwrap.core.plane import Plane, airs_around
 from qh_unwrap.core.stepping import finished
 
 from ..benchmarks.generated import hundred

@@ -97,6 +97,8 @@ def test_orders_of_graphs_that_fall_into_parts():
     piece = np.arange(9) % 3
     order = ordering.local_order(9, edges, piece)
     assert (np.diff(piece[order]) >= 0).all() and widths_of(order, edges)[0] == 1
+    order = ordering.local_order(10, edges, np.append(piece, 3))  # whose last piece is one vertex
+    assert sorted(order.tolist()) == list(range(10)) and order[-1] == 9
 
 
 def test_some_pieces_are_eliminated_as_all_are():

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 from qh_unwrap.core import Surface, bands, threads
-from qh_unwrap.core.bands import are_narrow
-from qh_unwrap.core.patterns import places
 
 from . import shapes
+from .test_bands import narrow_pieces
 
 
 def test_one_thread_is_used_meanwhile_and_as_many_as_before_afterwards():
@@ -26,7 +25,7 @@ def test_one_thread_is_used_meanwhile_and_as_many_as_before_afterwards():
             raise ZeroDivisionError
         library.scipy_openblas_set_num_threads(2)
         with pytest.raises(bands.IndefiniteError):
-            bands._Bands(np.zeros(1, int), np.zeros(1, int), 1, None, 0).factorized(-np.ones(1))
+            bands._Bands(np.zeros(1, int), np.zeros(1, int), np.zeros(1, int), 0).factorized(-np.ones(1))
         assert library.scipy_openblas_get_num_threads() == 2
     finally:
         library.scipy_openblas_set_num_threads(before)
@@ -38,7 +37,7 @@ def test_with_another_library_only_what_needs_no_threads_is_a_band(monkeypatch, 
         raise raised
 
     def is_narrow(surface):
-        return are_narrow(places(surface.order), surface.edges).all()
+        return narrow_pieces(surface).all()
 
     wide, row = Surface(*shapes.grid(30, 30)), Surface(*shapes.grid(1, 40))
     assert is_narrow(wide) and is_narrow(row)
