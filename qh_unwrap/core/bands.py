@@ -2,16 +2,18 @@
 """Equations of pieces so small that their matrices are narrow bands.
 
 LAPACK factorizes both coordinates' equations at once and exactly, in less time than it takes to come near their
-solution in any other way.
+solution in any other way.  Matrices that are not symmetric, as those of mean value weights, are solved for each
+coordinate.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dpbtrf, dpbtrs
+from scipy.linalg.lapack import dgbtrf, dgbtrs, dpbtrf, dpbtrs
 
 from .patterns import Unknowns, places, solved_each
 from .threads import is_known, one_thread
@@ -24,7 +26,8 @@ _UNBLOCKED = 15  # places, up to which LAPACK certainly uses one thread
 
 
 class IndefiniteError(Exception):
-    """The matrices of some `pieces`, (i,) int, are not positive definite, at least not up to rounding."""
+    """The matrices of some `pieces`, (i,) int, are singular, or symmetric and not positive definite, at least not up to
+    rounding."""
 
     def __init__(self, pieces: np.ndarray):
         super().__init__()
@@ -77,7 +80,7 @@ class Banded:
         self._unknowns, self._order, self._edges = unknowns, order, edges
         self._group = np.zeros(len(order), np.int64) if group is None else group
         self._coupled: _Bands | None = None  # of both coordinates' equations,
-        self._single: list[_Bands] = []  # and of each coordinate's by themselves
+        self._single: dict[bool, list[_Bands]] = {}  # and of each coordinate's by themselves, symmetric or not
         self._solve: Callable[[np.ndarray], np.ndarray] | None = None
 
     def newton_direction(
@@ -105,12 +108,13 @@ class Banded:
         return direction
 
     def solver(
-        self, forward: np.ndarray, _backward: np.ndarray, own: np.ndarray, _exactly: bool
+        self, forward: np.ndarray, backward: np.ndarray, own: np.ndarray, _exactly: bool
     ) -> Callable[[np.ndarray, np.ndarray], None]:
-        if not self._single:
-            self._single = [self._alone(unknowns) for unknowns in self._unknowns]
-        entries = np.concatenate([forward, own])
-        return solved_each(self._unknowns, [bands.factorized(entries) for bands in self._single])
+        symmetric = np.array_equal(forward, backward)
+        if symmetric not in self._single:
+            self._single[symmetric] = [self._alone(unknowns, symmetric) for unknowns in self._unknowns]
+        entries = np.concatenate([forward, own] if symmetric else [forward, backward, own])
+        return solved_each(self._unknowns, [bands.factorized(entries) for bands in self._single[symmetric]])
 
     @property
     def _of_both(self):
@@ -137,30 +141,94 @@ class Banded:
         u, v = at_vertices
         row, column = np.concatenate([ui, ui, vi, vi, u, u, v]), np.concatenate([uj, vj, uj, vj, u, v, v])
         tied = any(unknowns.tied for unknowns in self._unknowns)
-        return _Bands(row, column, piece, 4 * len(self._edges) if tied else 0)
+        return _Bands(row, column, piece, _SYMMETRIC, 4 * len(self._edges) if tied else 0)
 
-    def _alone(self, unknowns):
-        i, j = unknowns.number[self._edges.T]
-        row, column = np.concatenate([i, unknowns.number]), np.concatenate([j, unknowns.number])
-        return _Bands(row, column, self._group[unknowns.sequence], len(self._edges) if unknowns.tied else 0)
+    def _alone(self, unknowns, symmetric):
+        own, (i, j) = unknowns.number, unknowns.number[self._edges.T]
+        piece, twice = self._group[unknowns.sequence], len(self._edges) if unknowns.tied else 0
+        if symmetric:
+            return _Bands(np.concatenate([i, own]), np.concatenate([j, own]), piece, _SYMMETRIC, twice)
+        return _Bands(np.concatenate([i, j, own]), np.concatenate([j, i, own]), piece, _WHOLE, twice)
+
+
+class _Form(NamedTuple):
+    """How LAPACK takes matrices."""
+
+    symmetric: bool
+    height: Callable[[np.ndarray], np.ndarray]
+    """The rows of bands of a width (c,), (c,)."""
+    place: Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+    """The columns of a band and its rows, (e,), where the entries in rows (e,) and columns (e,) of the matrix go; the
+    width, (size,), is that of the band in which each unknown is."""
+    factorized: Callable[[np.ndarray], tuple[Callable[[np.ndarray], np.ndarray] | None, int]]
+    """The function that solves with a band, which is overwritten, and the number of the first column that stands in the
+    way, or 0; if it does, the function is of no use."""
+
+
+def _by_cholesky(band):
+    factor, failed = dpbtrf(band, lower=1, overwrite_ab=1)
+
+    def solve(rhs):
+        return dpbtrs(factor, rhs, lower=1)[0]
+
+    return solve, failed or _first_not_finite(factor[0])
+
+
+def _by_lu(band):
+    width = (len(band) - 1) // 3
+    failed = _first_not_finite(band.sum(axis=0))  # among which LAPACK might find no pivot
+    if failed:
+        return None, failed
+    factor, pivots, failed = dgbtrf(band, width, width, overwrite_ab=1)
+
+    def solve(rhs):
+        return dgbtrs(factor, width, width, rhs, pivots, trans=1)[0]
+
+    return solve, failed or _first_not_finite(factor[2 * width])
+
+
+def _first_not_finite(diagonal):
+    """The number of the first value that is not finite, counted from 1, or 0: LAPACK goes on where something is not a
+    number."""
+    return 0 if np.isfinite(diagonal.sum()) else int(np.argmin(np.isfinite(diagonal))) + 1
+
+
+# Of symmetric matrices the lower half, column by column from the diagonal down
+_SYMMETRIC = _Form(
+    True,
+    lambda width: width + 1,
+    lambda row, column, _width: (np.minimum(row, column), np.abs(row - column)),
+    _by_cholesky,
+)
+# Others are transposed, and have room for what pivots would fill in.  What is dominated by the diagonals of its rows
+# needs none then: LAPACK, which looks for them down each column, stays on the diagonal.
+_WHOLE = _Form(
+    False,
+    lambda width: 3 * width + 1,
+    lambda row, column, width: (row, 2 * width[row] + column - row),
+    _by_lu,
+)
 
 
 class _Bands:
-    """Where the entries of symmetric matrices go in bands, of which there is one for all pieces of about one width.
+    """Where the entries of matrices go in bands, of which there is one for all pieces of about one width.
 
     Parameters
     ----------
-    row, column : (e,), the unknowns that every entry joins, in either order; -1 for what is no unknown
+    row, column : (e,), the unknowns that every entry joins; -1 for what is no unknown
     piece : (size,), the piece that each unknown belongs to, one after the other
-    twice : so many first entries stand for a second one, in the same place if they join an unknown to itself, which
-        they do only where some move together
+    form : how matrices are stored and factorized
+    twice : so many first entries stand for a second one if the matrix is symmetric.  They are 0 unless some unknowns
+        move together: only then several entries may have one place
     """
 
-    def __init__(self, row: np.ndarray, column: np.ndarray, piece: np.ndarray, twice: int):
+    def __init__(self, row: np.ndarray, column: np.ndarray, piece: np.ndarray, form: _Form, twice: int):
+        self._form = form
         self._entry = entry = np.flatnonzero((row >= 0) & (column >= 0))
-        low, gap = np.minimum(row[entry], column[entry]), np.abs(row[entry] - column[entry])
-        self._twice = np.where((entry < twice) & (gap == 0), 2.0, 1.0) if twice else None
-        width = _largest(gap, low, piece)
+        row, column = row[entry], column[entry]
+        gap = np.abs(row - column)
+        self._twice = np.where((entry < twice) & (gap == 0) & form.symmetric, 2.0, 1.0) if twice else None
+        width = _largest(gap, row, piece)
         kind = np.frexp(width)[1]  # of one kind are those up to the same power of two
         count = np.bincount(kind[piece], minlength=1)
         there = np.flatnonzero(count)
@@ -168,12 +236,15 @@ class _Bands:
         if len(there) > 1:
             self._order = np.argsort(kind[piece], kind="stable")
             self._piece = piece[self._order]
-            low = places(self._order)[low]
+            place = places(self._order)
+            row, column = place[row], place[column]
         ends = np.cumsum(count[there]).tolist()
         self._columns = [slice(*both) for both in pairwise([0, *ends])]
-        self._rows = [int(width[kind == each].max()) + 1 for each in there.tolist()]
-        height = np.repeat(np.array(self._rows, np.int64), count[there])
-        self._length, self._place = int(height.sum()), (np.cumsum(height) - height)[low] + gap
+        widest = np.array([width[kind == each].max() for each in there.tolist()], np.int64)
+        height = np.repeat(form.height(widest), count[there])
+        self._rows = form.height(widest).tolist()
+        at, below = form.place(row, column, np.repeat(widest, count[there]))
+        self._length, self._place = int(height.sum()), (np.cumsum(height) - height)[at] + below
 
     def factorized(self, entries: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The function that solves for right-hand sides (size, ...) with the matrix of the `entries` (e,).
@@ -181,22 +252,22 @@ class _Bands:
         Raises `IndefiniteError`.
         """
         entries = entries[self._entry]
-        factors, indefinite = [], []
+        solves, indefinite = [], []
         with one_thread():
             for band, its in zip(self._filled(entries), self._columns, strict=True):
-                factor, failed = _factorized(band)
+                solve_band, failed = self._form.factorized(band)
                 if failed:
                     indefinite.append(self._piece[its][failed - 1])
-                factors.append(factor)
+                solves.append(solve_band)
             if indefinite:
                 raise IndefiniteError(np.unique([*indefinite, *self._indefinite(entries)]))
 
         def solve(rhs):
             if self._order is None:
-                return _solved(factors[0], rhs) if factors else rhs
+                return solves[0](rhs) if solves else rhs
             result = np.empty(rhs.shape)
-            for factor, its in zip(factors, self._columns, strict=True):
-                result[self._order[its]] = _solved(factor, rhs[self._order[its]])
+            for solve_band, its in zip(solves, self._columns, strict=True):
+                result[self._order[its]] = solve_band(rhs[self._order[its]])
             return result
 
         return solve
@@ -213,23 +284,11 @@ class _Bands:
         return [bands[slice(*both)].reshape(-1, rows).T for both, rows in zip(ends, self._rows, strict=True)]
 
     def _indefinite(self, entries):
-        """The pieces whose matrices are not positive definite by themselves."""
+        """The pieces whose matrices cannot be factorized by themselves."""
         for band, its in zip(self._filled(entries), self._columns, strict=True):
             piece = self._piece[its]
             ends = np.flatnonzero(np.diff(piece, append=-1)) + 1
             for start, end in pairwise([0, *ends.tolist()]):
-                _, failed = _factorized(np.asfortranarray(band[:, start:end]))
+                _, failed = self._form.factorized(np.asfortranarray(band[:, start:end]))
                 if failed:
                     yield piece[start]
-
-
-def _factorized(band):
-    """The factor of a band, which is overwritten, and the number of the first column that stands in the way, or 0."""
-    factor, failed = dpbtrf(band, lower=1, overwrite_ab=1)
-    if not failed and not np.isfinite(factor[0].sum()):  # LAPACK goes on where something is not a number
-        failed = int(np.argmin(np.isfinite(factor[0]))) + 1
-    return factor, failed
-
-
-def _solved(factor, rhs):
-    return dpbtrs(factor, rhs, lower=1)[0]

@@ -103,12 +103,12 @@ class Constrained:
 
     @cached_property
     def _equations(self) -> list[Equations]:
-        """Those of all pieces, if their matrices are symmetric and positive definite."""
+        """Those of all pieces, unless the matrices of narrow ones are indefinite."""
         return self._apart(self._narrow)
 
     @cached_property
     def _everything(self) -> Sparse:
-        """Those of all pieces, whatever their matrices are."""
+        """Those of all pieces as sparse ones."""
         return self._sparse(np.ones(len(self.order), bool), self.alike)
 
     def _apart(self, narrow):
@@ -198,10 +198,7 @@ class Constrained:
         return result
 
     def _solvers(self, forward, backward, own, exactly):
-        given = forward, backward, own, exactly
-        if np.array_equal(forward, backward):
-            return self._asked(lambda each: each.solver(*given))[0]
-        return [self._everything.solver(*given)]
+        return self._asked(lambda each: each.solver(forward, backward, own, exactly))[0]
 
     def newton_direction(
         self,

@@ -4,6 +4,7 @@ import pytest
 
 from qh_unwrap.core import Surface, bands
 from qh_unwrap.core.bands import Banded, IndefiniteError, are_narrow, widths
+from qh_unwrap.core.errors import SingularError
 from qh_unwrap.core.patterns import Unknowns, places
 from qh_unwrap.core.pieces import joined
 from qh_unwrap.core.systems import Constrained
@@ -135,3 +136,54 @@ def test_what_is_not_finite_is_not_solved():
         own[0][7] = value
         with pytest.raises(IndefiniteError):
             Banded(everything, surface.order, surface.edges).newton_direction(np.zeros((n, 2)), beside, own, 0.0)
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_matrices_that_are_not_symmetric_are_solved_as_bands(monkeypatch, tied):
+    meshes = [shapes.grid(40, 1), shapes.grid(9, 9), shapes.bump(3, inner=30, outer=12)]
+    surface = Surface(*joined(*zip(*meshes, strict=True)))
+    n, rng = len(surface.vertices), np.random.default_rng(11)
+    held, partner = np.isin(np.arange(n), surface.vertex_starts), np.arange(n)
+    if tied:
+        partner[[5, 7]] = 7, 5  # neighbours in the ribbon, and others
+        partner[[90, 96]] = 96, 90
+    weights = rng.uniform(1e-6, 1, (2, len(surface.edges))) ** 3
+    values = rng.normal(size=(n, 2))
+    both = np.column_stack([partner, partner])
+    found = []
+    for narrow in (True, False):
+        monkeypatch.setattr(bands, "_WIDEST", 128 if narrow else -1)
+        system = Constrained(surface.order, surface.edges, held, values, both, surface.vertex_piece)
+        found.append(system.solve(weights))
+        assert ("_everything" in vars(system)) != narrow
+    np.testing.assert_allclose(*found, rtol=1e-9, atol=1e-12)
+    if not tied:
+        matrix = laplacian_of(surface.edges, weights, n)
+        np.testing.assert_allclose((matrix @ found[0])[~held], 0, atol=1e-12)
+
+
+def test_a_solution_lies_between_its_neighbours_however_much_it_shrinks():
+    # As in a harmonic map of a long tube, far beyond single precision
+    length = 200
+    surface = Surface(*shapes.grid(length, 1))
+    held = surface.vertices[:, 0] < surface.vertices[:, 0].min() + 1e-9
+    i, j = surface.edges.T
+    inward = surface.vertices[i, 0] < surface.vertices[j, 0]
+    weights = np.where(inward, [[1.0], [9.0]], [[9.0], [1.0]])
+    values = np.column_stack([np.arange(len(held)), -np.arange(len(held))]).astype(float)
+    found = Constrained(surface.order, surface.edges, held, values).solve(weights)
+    assert np.isfinite(found).all()
+    low, high = values[held].min(axis=0), values[held].max(axis=0)
+    assert (found >= low - 1e-9).all() and (found <= high + 1e-9).all()
+
+
+@pytest.mark.parametrize("bad", [0.0, np.nan, np.inf])
+def test_one_piece_without_a_solution_is_told(bad):
+    surface = ribbon_and_sheet()
+    n = len(surface.vertices)
+    held = np.isin(np.arange(n), surface.vertex_starts)
+    weights = np.random.default_rng(12).uniform(0.5, 1, (2, len(surface.edges)))
+    weights[:, surface.vertex_piece[surface.edges[:, 0]] == 1] = bad
+    system = Constrained(surface.order, surface.edges, held, np.ones((n, 2)), group=surface.vertex_piece)
+    with pytest.raises(SingularError), np.errstate(invalid="ignore"):
+        system.solve(weights)

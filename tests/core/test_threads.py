@@ -25,7 +25,9 @@ def test_one_thread_is_used_meanwhile_and_as_many_as_before_afterwards():
             raise ZeroDivisionError
         library.scipy_openblas_set_num_threads(2)
         with pytest.raises(bands.IndefiniteError):
-            bands._Bands(np.zeros(1, int), np.zeros(1, int), np.zeros(1, int), 0).factorized(-np.ones(1))
+            bands._Bands(np.zeros(1, int), np.zeros(1, int), np.zeros(1, int), bands._SYMMETRIC, 0).factorized(
+                -np.ones(1)
+            )
         assert library.scipy_openblas_get_num_threads() == 2
     finally:
         library.scipy_openblas_set_num_threads(before)
