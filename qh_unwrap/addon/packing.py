@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laying islands out beside one another, by Blender's own packer."""
+"""Laying islands out beside one another, by Blender's own packer, or one by itself where that would put it."""
 
 import bpy
 import numpy as np
@@ -8,6 +8,7 @@ from ..core import UnwrapError
 from . import bulk
 
 _NAME = "QH Unwrap"
+_SCALED = 0.1  # times the root of a box's area: what Blender takes for a margin of 1 that is scaled with islands
 
 
 def pack(islands, uv, aspects, options, nested, context):
@@ -26,6 +27,9 @@ def pack(islands, uv, aspects, options, nested, context):
     # Of each island Blender gets a rectangle.
     low, high = islands.boxes(uv)
     high = np.maximum(high, low + 1e-6 * (high - low).max())
+    if len(low) == 1 and 2 * options.margin < 1:
+        scale, margin = _alone((high - low)[0] / (aspects[0], 1), options)
+        return (uv - low) * scale + margin * np.array([aspects[0], 1])
     corners = np.stack([low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])])
     halves = 4 * np.arange(len(low))[:, None, None] + [[0, 1, 2], [0, 2, 3]]
     boxes = corners.swapaxes(0, 1).reshape(-1, 2), halves.reshape(-1, 3), np.repeat(aspects, 2)
@@ -33,6 +37,15 @@ def pack(islands, uv, aspects, options, nested, context):
     scale = np.ptp(packed, axis=1).max(axis=1) / (high - low).max(axis=1)
     low, scale, new = (each[islands.piece] for each in (low, scale[:, None], packed[:, 0]))
     return (uv - low) * scale + new
+
+
+def _alone(size, options):
+    """The scale of a single box of a `size` (2,), and its distance from the square's sides, as Blender has them."""
+    if options.margin_method == 'FRACTION':
+        return (1 - 2 * options.margin) / size.max(), options.margin
+    margin = options.margin if options.margin_method == 'ADD' else _SCALED * options.margin * np.sqrt(size.prod())
+    scale = 1 / (size.max() + 2 * margin)
+    return scale, margin * scale
 
 
 def _packed(uv, triangles, aspect, options, nested, context):

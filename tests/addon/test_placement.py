@@ -5,7 +5,8 @@ import pytest
 from scenes import add_grid, edit_mode, mesh_object, uvs
 from scipy.spatial import Delaunay
 
-from qh_unwrap.addon import operators
+from qh_unwrap.addon import operators, packing
+from qh_unwrap.addon.options import MeshOptions
 from qh_unwrap.addon.outcome import sentences, summary
 from qh_unwrap.core import placing
 from qh_unwrap.core.pieces import Pieces
@@ -188,6 +189,20 @@ def test_margin(method, least):
         return min(uvs(one).min(), uvs(other).min(), (1 - uvs(one)).min(), (1 - uvs(other)).min())
 
     assert least < margin_of(0.05) - margin_of(0) < 0.051
+
+
+@pytest.mark.parametrize("method", ['SCALED', 'ADD', 'FRACTION'])
+@pytest.mark.parametrize("aspect", [1.0, 2.0, 0.4])
+def test_a_single_island_goes_where_blenders_packer_puts_it(monkeypatch, method, aspect):
+    random = np.random.default_rng(7)
+    triangles = np.array([(0, 1, 2), (0, 2, 3)])
+    for margin in (0, 0.005, 0.1, 0.45):
+        width, height = random.uniform(0.1, 10, 2)
+        uv = np.array([(0, 0), (width, 0), (width, height), (0, height)]) + random.normal(size=2)
+        island, options = Pieces([np.zeros((4, 3))], [triangles]), MeshOptions(margin_method=method, margin=margin)
+        alone = packing.pack(island, uv, [aspect], options, False, bpy.context)
+        by_blender = packing._packed(uv, triangles, np.full(2, aspect), options, False, bpy.context)
+        np.testing.assert_allclose(alone, by_blender, atol=2e-5 * max(aspect, 1))
 
 
 def height_gradient(obj):
