@@ -9,6 +9,7 @@ from copy import copy
 import numpy as np
 from scipy.sparse import bsr_array, coo_array, csc_array
 
+from .pieces import first_of_parts
 from .triangles import parts
 
 
@@ -24,8 +25,8 @@ class Unknowns:
 
     def __init__(self, order: np.ndarray, held: np.ndarray, partner: np.ndarray | None = None):
         self.tied = partner is not None and bool((partner != np.arange(len(order))).any())
-        if self.tied:
-            leader = _leaders(partner)
+        if partner is not None and self.tied:
+            leader = first_of_parts(len(order), np.arange(len(order)), partner)
             stuck = np.bincount(leader, held, len(order)) > 0  # who is tied to a held vertex is held as well
             held = held | stuck[leader]
             leads = leader == np.arange(len(order))
@@ -57,19 +58,6 @@ class Unknowns:
         else:
             free = ~self.held
             out[free] += values[self.number[free]]
-
-
-def _leaders(partner):
-    """The first vertex of every set of vertices that are tied to one another, (n,)."""
-    leader = np.minimum(partner, np.arange(len(partner)))
-    while True:
-        smaller = leader.copy()
-        np.minimum.at(smaller, partner, leader)
-        smaller = np.minimum(smaller, smaller[partner])
-        smaller = smaller[smaller]
-        if (smaller == leader).all():
-            return leader
-        leader = smaller
 
 
 class Pattern:

@@ -6,8 +6,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from .triangles import areas_in_space, corners_of, signed_areas
 
@@ -61,13 +59,36 @@ def first_and_last(items: np.ndarray, place: np.ndarray, count: int) -> tuple[np
     return first, last
 
 
-def components(count: int, one: np.ndarray, other: np.ndarray) -> tuple[int, np.ndarray]:
-    """How many parts `count` things fall into, and the part of each, (count,).
+def first_of_parts(count: int, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The first of all of `count` things that hang together by links with each of them, (count,).
 
-    The k-th link joins the things `one[k]` and `other[k]`; parts are what hangs together by links.
+    The k-th link joins the things `one[k]` and `other[k]`.
     """
-    one, other = one.astype(np.int32), other.astype(np.int32)  # the type that SciPy would convert them to
-    return connected_components(coo_array((np.ones(len(one)), (one, other)), shape=(count, count)), directed=False)
+    first = np.arange(count)
+    while True:
+        # Whatever is no least one among its neighbours is led to one of these, so that at most half remain, and then
+        # all to where their leaders were led.
+        one, other = first[one], first[other]
+        apart = one != other
+        if not apart.any():
+            return first
+        one, other = one[apart], other[apart]
+        first[np.maximum(one, other)] = np.minimum(one, other)
+        while True:
+            farther = first[first]
+            if np.array_equal(farther, first):
+                break
+            first = farther
+
+
+def components(count: int, one: np.ndarray, other: np.ndarray) -> tuple[int, np.ndarray]:
+    """How many parts `count` things fall into, and the part of each, (count,), numbered by their first things.
+
+    Parts are what hangs together by links, as in `first_of_parts`.
+    """
+    first = first_of_parts(count, one, other)
+    is_first = first == np.arange(count)
+    return int(is_first.sum()), (np.cumsum(is_first) - 1)[first]
 
 
 def joined(

@@ -3,6 +3,8 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from qh_unwrap.core import Surface
 from qh_unwrap.core.certificate import are_injective, certified_pieces, is_injective
@@ -11,7 +13,7 @@ from qh_unwrap.core.domain import Fixed, Held
 from qh_unwrap.core.energy import Barrier, energies, map_scale
 from qh_unwrap.core.flattening import conformal
 from qh_unwrap.core.initial import project
-from qh_unwrap.core.pieces import joined
+from qh_unwrap.core.pieces import components, first_of_parts, joined
 
 from . import shapes
 from .patches import Patches
@@ -97,3 +99,18 @@ def test_a_chosen_piece_is_the_surface_that_it_was_made_of(meshes):
         for name in ("vertices", "triangles", "edges", "triangle_edges", "rest", "on_boundary"):
             np.testing.assert_allclose(getattr(one, name), getattr(alone, name), rtol=1e-9, atol=1e-12, err_msg=name)
         assert all(np.array_equal(*loops) for loops in zip(one.loops, alone.loops, strict=True))
+
+
+@pytest.mark.parametrize("count, links", [(1, 0), (7, 3), (50, 30), (50, 400), (3000, 2500), (3000, 9000)])
+def test_parts_are_what_hangs_together(count, links):
+    rng = np.random.default_rng(links)
+    one, other = rng.integers(0, count, (2, links))
+    found, part = components(count, one, other)
+    graph = coo_array((np.ones(links), (one, other)), shape=(count, count))
+    expected, expected_part = connected_components(graph, directed=False)
+    assert found == expected
+    assert (part == expected_part).all()
+    # A chain in any order is one part.
+    chain = rng.permutation(count)
+    assert components(count, chain[:-1], chain[1:])[0] == 1
+    assert (first_of_parts(count, chain[1:], chain[:-1]) == 0).all()
