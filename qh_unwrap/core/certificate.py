@@ -223,6 +223,8 @@ def crossing_sides(
         a, b, c, d = start[one], end[one], start[other], end[other]
         across = turn(a, b, c) * turn(a, b, d)
         meet = across <= 0 if touching else across < 0
+        if not meet.any():
+            continue
         one, other, (a, b, c, d) = one[meet], other[meet], (each[meet] for each in (a, b, c, d))
         back = turn(c, d, a) * turn(c, d, b)
         meet = back <= 0 if touching else back < 0

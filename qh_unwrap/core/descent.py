@@ -176,7 +176,7 @@ def _polished(domain, energy, uv, going):
     """The map after another step with the last one's Hessian, in the pieces that are `going` (p,) bool."""
     jacobian = energy.jacobian(uv)
     start = energy.value(jacobian)
-    gradient = _gradient(domain, energy, energy.derivatives(jacobian)[:2])
+    gradient = _gradient(domain, energy, energy.gradient(jacobian))
     gradient[~going[domain.vertex_piece]] = 0
     direction = domain.constrained.next_direction(gradient, _ROUGH)
     return _moved(domain, energy, uv, jacobian, start, going, gradient, direction)[0]

@@ -187,6 +187,17 @@ class Barrier:
             *self._own,
         )
 
+    def gradient(self, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What `derivatives` returns first, without the Hessian: it needs no singular values."""
+        if self._void is not None:
+            jacobian = np.where(self._void, np.eye(2)[:, :, None], jacobian)
+        return by_parts(
+            lambda jacobian, hats, weight: _gradient(jacobian, hats, weight, self._balance),
+            jacobian,
+            self._hats,
+            self._weight,
+        )
+
     def pull(self, jacobian: np.ndarray) -> tuple[np.ndarray, ...]:
         """What pulls every triangle to its shape at rest, turned as in the map: the gradient of half its squared
         distance from that (Liu et al. 2008) by the corners' u and v, and that energy's Hessian, the same in u and v, of
@@ -254,6 +265,21 @@ def _derivatives(jacobian, hats, weight, density):
         difference * cos - symmetric * sin,
         difference * sin + symmetric * cos,
         (f12 - skew) * (other - one),
+    )
+
+
+def _gradient(jacobian, hats, weight, balance):
+    (a, b), (c, d) = jacobian
+    p, r = exponents(balance)
+    size, det = a * a + b * b + c * c + d * d, a * d - b * c
+    square = det * det
+    value = weight * density(size, det, balance)
+    by_size = 2 * p * value / size
+    by_det = value / det * (r * (square - 1) / (square + 1) - p)
+    h1, h2 = _with_first(hats[:, 0]), _with_first(hats[:, 1])
+    return (
+        (by_size * a + by_det * d) * h1 + (by_size * b - by_det * c) * h2,
+        (by_size * c - by_det * b) * h1 + (by_size * d + by_det * a) * h2,
     )
 
 

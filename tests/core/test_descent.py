@@ -40,6 +40,7 @@ def test_the_gradient_is_the_derivative_of_the_energy(seed, balance):
     surface, uv, direction = bent(seed)
     barrier = Barrier(unheld(surface, uv), uv, balance, np.array([1.3]))
     gradient = np.array(barrier.derivatives(barrier.jacobian(uv))[:2])
+    np.testing.assert_allclose(barrier.gradient(barrier.jacobian(uv)), gradient, rtol=1e-9, atol=1e-12)
     total = np.zeros_like(uv)
     for corner in range(3):
         np.add.at(total, surface.triangles[:, corner], gradient[:, corner].T)
