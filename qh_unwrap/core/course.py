@@ -110,7 +110,7 @@ class Course(Improvement):
     # Starts
 
     def _begin(self, start):
-        self.start[:] = self.now[:] = self.best[:] = start
+        self.now[:] = self.best[:] = start
         self.valid[:] = ~wrong_pieces([self.batch.surface], start)
 
     def _outlined(self, current: np.ndarray | None = None) -> Steps:
@@ -131,7 +131,7 @@ class Course(Improvement):
         if current is None:
             given = batch.uv[rows], batch.has_uv[group.pieces], values[rows]
             start = start_within(group.domain, settings, *given)
-            self.start[rows] = self.now[rows] = self.best[rows] = start[: len(rows)]
+            self.now[rows] = self.best[rows] = start[: len(rows)]
         else:
             start = group.domain.start(np.where(held, values, current)[rows])
         group.uv = start
@@ -254,7 +254,7 @@ class Course(Improvement):
             rows = batch.rows(crossed)
             start[rows] = natural_start(batch.surface.of(crossed), self.settings, "MEAN_VALUE")
             self._put_pins(start, crossed)
-            self.start[rows] = self.now[rows] = self.best[rows] = start[rows]
+            self.now[rows] = self.best[rows] = start[rows]
             for k in np.flatnonzero(crossed):
                 self.warnings[k] += ("the start overlaps itself: begun with a circle",)
             still = crossed.copy()

@@ -80,7 +80,6 @@ def _as_one_run(old, result):
     report = replace(
         last,
         before=first.before,
-        initial=first.initial,
         iterations=first.iterations + last.iterations,
         changes=first.changes + last.changes,
     )

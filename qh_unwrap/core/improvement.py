@@ -73,7 +73,7 @@ class Improvement:
 
     Attributes, all for the batch's pieces or vertices
     ----------
-    start, now, best : (n, 2), the initial map, the latest and the best so far
+    now, best : (n, 2), the latest map and the best so far
     changes : list of lists, for every step of a piece the largest movement of a vertex by the layout's diameter
     valid : (p,) bool, in the latest map nothing is flipped, air included
     converged : (p,) bool, another step would change nothing, or would not pay
@@ -89,7 +89,7 @@ class Improvement:
     def __init__(self, batch: Batch, settings: Settings):
         self.batch, self.settings = batch, settings
         n, p = len(batch.uv), batch.surface.piece_count
-        self.start, self.now, self.best = (np.zeros((n, 2)) for _ in range(3))
+        self.now, self.best = np.zeros((2, n, 2))
         self.changes: list[list[float]] = [[] for _ in range(p)]
         self.valid, self.converged, self.unfinished, self.repaired, self.sure = (np.zeros(p, bool) for _ in range(5))
         self.warnings: list[tuple[str, ...]] = [()] * p

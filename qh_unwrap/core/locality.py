@@ -54,7 +54,7 @@ class Sorted:
     def restored_result(self, result: Result) -> Result:
         """The result of the sorted mesh as that of the mesh in its own order."""
         report = result.report
-        measured = {name: self._restored_distortion(getattr(report, name)) for name in ("before", "initial", "after")}
+        measured = {name: self._restored_distortion(getattr(report, name)) for name in ("before", "after")}
         loops = [self._order[loop] for loop in result.loops]
         return replace(result, uv=self.restored(result.uv), report=replace(report, **measured), loops=loops)
 

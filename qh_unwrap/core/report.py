@@ -67,8 +67,6 @@ class Report:
 
     before: Distortion | None
     """That of the UVs that were given, if any."""
-    initial: Distortion
-    """That of the initial map."""
     after: Distortion
     """That of the result."""
     iterations: int
@@ -88,7 +86,6 @@ class Report:
         names = ("iterations", "converged", "injective", "mirrored")
         return {
             "before": self.before and self.before.to_dict(),
-            "initial": self.initial.to_dict(),
             "after": self.after.to_dict(),
             **{name: getattr(self, name) for name in names},
             "changes": list(self.changes),

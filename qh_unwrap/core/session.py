@@ -166,7 +166,7 @@ class Unwrapper:
         batch, surface = course.batch, course.batch.surface
         chosen = course.placed(course.best)
         before = measure_pieces(surface, batch.start) if batch.has_uv.any() else [None] * surface.piece_count
-        initial, after = measure_pieces(surface, course.start), measure_pieces(surface, chosen)
+        after = measure_pieces(surface, chosen)
         certified = course.sure.copy()
         if not certified.all():
             part, rows = surface, np.ones(len(chosen), bool)
@@ -191,7 +191,6 @@ class Unwrapper:
                 warnings += face_warnings(its, given.face(int(batch.index[k])))
             report = Report(
                 before=before[k] if has_uv[k] else None,
-                initial=initial[k],
                 after=after[k],
                 iterations=len(course.changes[k]),
                 converged=converged,
