@@ -89,7 +89,8 @@ class Barrier:
     def rest(self, uv: np.ndarray) -> None:
         """Take the shape that the air has in the map `uv` (n, 2), which is to be improved, for that at rest.
 
-        The map's derivative and value are kept in `resting` and `resting_value`.
+        The map's derivative and value are kept in `resting` and `resting_value`, the least possible value, where every
+        triangle keeps its shape, in `least`, (p,).
         """
         # A face without area in space that lies folded over bars nothing: nothing could be done about it.
         self._void = None
@@ -105,6 +106,7 @@ class Barrier:
         for chart, part in self._air:
             self._hats[..., part] = hat_gradients(chart.shapes(uv))
             self._weight[part] = 1
+        self.least = sum(chart.sums(self._weight[its]) for chart, its in self._solid)
         self.resting = self.jacobian(uv)
         self.resting_value = value = self.value(self.resting)
         if self._air:
@@ -125,11 +127,6 @@ class Barrier:
     def _at(self, values, chart):
         """The values (p,) of the pieces at a chart's triangles, (m,), or the one that there is."""
         return values[0] if self._single else values[chart.piece]
-
-    @property
-    def least(self) -> np.ndarray:
-        """Its least possible value, where every triangle keeps its shape, (p,)."""
-        return sum(chart.sums(self._weight[its]) for chart, its in self._solid)
 
     def jacobian(self, uv: np.ndarray) -> np.ndarray:
         """The map's derivative in every triangle, (2, 2, m)."""

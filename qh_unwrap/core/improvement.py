@@ -230,15 +230,15 @@ class Improvement:
             yield STEP
             if not going.any():
                 return
-            if group.shares(going) <= _FEW:
+            if not going.all() and group.shares(going) <= _FEW:
                 group, descent, folded = group.of(going), descent.of(going), folded[going]
                 going = np.ones(len(group.pieces), bool)
         self.unfinished[group.pieces[going]] = True
 
     def _note(self, group, valid, repaired, change, going):
         """Keep what the latest step has brought, for the pieces that are `going` (p',) bool."""
-        pieces, rows = group.pieces[going], group.rows[going[group.domain.island.vertex_piece]]
-        self.now[rows] = group.island_uv[going[group.domain.island.vertex_piece]]
+        pieces, chosen = group.pieces[going], going[group.domain.island.vertex_piece]
+        self.now[group.rows[chosen]] = group.island_uv[chosen]
         self.valid[pieces], self.repaired[pieces] = valid[going], repaired[going]
         if change is not None:
             for k, its in zip(pieces.tolist(), change[going].tolist(), strict=True):
