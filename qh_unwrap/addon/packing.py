@@ -27,7 +27,7 @@ def pack(islands, uv, aspects, options, nested, context):
     # Of each island Blender gets a rectangle.
     low, high = islands.boxes(uv)
     high = np.maximum(high, low + 1e-6 * (high - low).max())
-    if len(low) == 1 and 2 * options.margin < 1:
+    if len(low) == 1 and 2 * options.margin < 1:  # from there on Blender says what it makes of no room at all
         scale, margin = _alone((high - low)[0] / (aspects[0], 1), options)
         return (uv - low) * scale + margin * np.array([aspects[0], 1])
     corners = np.stack([low, np.column_stack([high[:, 0], low[:, 1]]), high, np.column_stack([low[:, 0], high[:, 1]])])

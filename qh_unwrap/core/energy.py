@@ -172,28 +172,28 @@ class Barrier:
         Four parts (mean, difference, symmetric, antisymmetric) make up the blocks [[m + d, s - a], [s + a, m - d]].
         Every triangle's part is made positive by its analytic eigenvalues (Smith, de Goes, Kim 2019).
         """
-        if self._void is not None:
-            jacobian = np.where(self._void, np.eye(2)[:, :, None], jacobian)
         return by_parts(
             lambda jacobian, hats, weight, *own: _derivatives(
                 jacobian, hats, weight, lambda s1, s2: self._density(s1, s2, *own)
             ),
-            jacobian,
+            self._at_voids(jacobian),
             self._hats,
             self._weight,
             *self._own,
         )
 
-    def gradient(self, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def gradient(self, jacobian: np.ndarray) -> tuple[np.ndarray, ...]:
         """What `derivatives` returns first, without the Hessian: it needs no singular values."""
-        if self._void is not None:
-            jacobian = np.where(self._void, np.eye(2)[:, :, None], jacobian)
         return by_parts(
             lambda jacobian, hats, weight: _gradient(jacobian, hats, weight, self._balance),
-            jacobian,
+            self._at_voids(jacobian),
             self._hats,
             self._weight,
         )
+
+    def _at_voids(self, jacobian):
+        """The map's derivative, with some number where triangles bar nothing and weigh nothing."""
+        return jacobian if self._void is None else np.where(self._void, np.eye(2)[:, :, None], jacobian)
 
     def pull(self, jacobian: np.ndarray) -> tuple[np.ndarray, ...]:
         """What pulls every triangle to its shape at rest, turned as in the map: the gradient of half its squared

@@ -97,6 +97,9 @@ class _Bent(Barrier):
         # Newton's own length, and a little more, since nothing is in the way
         return np.full(self._domain.island.piece_count, _LONG)
 
+    def gradient(self, jacobian: np.ndarray) -> tuple[np.ndarray, ...]:
+        return self.derivatives(jacobian)[:2]
+
     def _density(self, s1, s2, bent):
         det = s1 * s2
         root = np.hypot(det, bent)
