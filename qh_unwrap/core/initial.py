@@ -66,8 +66,10 @@ def led(points: np.ndarray, held: np.ndarray, values: np.ndarray) -> np.ndarray:
 def project(surface: Surface) -> np.ndarray:
     """The projection of every piece on its least-squares plane, seen from the side that its faces look to, (n, 2)."""
 
+    points = np.asfortranarray(surface.vertices)
+
     def moments(corner_vertex):
-        corners = corners_of(surface.vertices, corner_vertex.T)
+        corners = corners_of(points, corner_vertex.T)
         normal = normals(corners).T
         share = np.linalg.norm(normal, axis=0)
         # The second moments of a triangle are those of its corners and of three times its centre, each a twelfth.

@@ -107,7 +107,7 @@ def laid_flat(points: np.ndarray, triangles: np.ndarray, size: float) -> tuple[n
     Also returns which of them are too flat, (m,) bool: these get a height.  `size` is the length of an edge, by and
     large; no longest edge counts as shorter than a small part of it.
     """
-    shortest = _FLATTEST * size
+    points, shortest = np.asfortranarray(points), _FLATTEST * size
 
     def laid(corner_vertex):
         corners = corners_of(points, corner_vertex.T)
