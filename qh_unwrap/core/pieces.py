@@ -65,20 +65,19 @@ def first_of_parts(count: int, one: np.ndarray, other: np.ndarray) -> np.ndarray
     The k-th link joins the things `one[k]` and `other[k]`.
     """
     first = np.arange(count)
-    while True:
+    while len(one):
         # Whatever is no least one among its neighbours is led to one of these, so that at most half remain, and then
         # all to where their leaders were led.
-        one, other = first[one], first[other]
-        apart = one != other
-        if not apart.any():
-            return first
-        one, other = one[apart], other[apart]
         first[np.maximum(one, other)] = np.minimum(one, other)
         while True:
             farther = first[first]
             if np.array_equal(farther, first):
                 break
             first = farther
+        one, other = first[one], first[other]
+        apart = one != other
+        one, other = one[apart], other[apart]
+    return first
 
 
 def components(count: int, one: np.ndarray, other: np.ndarray) -> tuple[int, np.ndarray]:
