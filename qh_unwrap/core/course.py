@@ -16,9 +16,10 @@ from .chart import Surface
 from .domain import Fixed, loose, outlined, rigid
 from .energy import ISOMETRIC, energies
 from .errors import SingularError
-from .improvement import D, Group, Improvement, Steps
+from .improvement import FAR_HANDOVER, D, Group, Improvement, Steps, movement
 from .pins import lead, way_of
 from .plane import Plane, airs_around
+from .quasi_harmonic import Iteration
 from .settings import Settings
 from .starts import before_pins, best_start, natural_start, start_within, with_pins
 from .stepping import PART, STEP
@@ -204,6 +205,11 @@ class Course(Improvement):
         value, winding = energies(surface, start, settings.balance), surface.outline_lengths**2 > _LONG * 4 * np.pi
         if self.refining:
             small = ~winding & (np.bincount(surface.piece, minlength=p) <= _FEW)
+            far = small & new & directly & np.isfinite(value) & (value >= _SMALL_NEAR) & ~batch.has_hold
+            if certified is not None:
+                far &= certified
+            if far.any():
+                yield from self._drawn_near(start, value, far)
             soon = value < np.where(small, _SMALL_NEAR, _NEAR)
             if soon.any():
                 certified = certified_pieces(surface, start) if certified is None else certified
@@ -233,6 +239,31 @@ class Course(Improvement):
         far = ~(done | near)
         if far.any():
             yield from self._in_air(far, start.copy(), rigidly=far & rigidly & (value < _NEAR))
+
+    def _drawn_near(self, start: np.ndarray, value: np.ndarray, pieces: np.ndarray) -> Steps:
+        """Iterate from the maps `start` (n, 2) of the chosen pieces (p,) bool within their outlines, as long as that
+        halves their energies `value` (p,), until the refinement will soon arrive: both arrays tell how far that led."""
+        group = self._group(pieces, start, rigid)
+        iteration, going = Iteration(group.domain, self.settings), np.ones(len(group.pieces), bool)
+        for _ in range(self.settings.iterations):
+            yield PART
+            _, after, valid = iteration.step(group.uv)
+            island = group.domain.island
+            before, now = value[group.pieces], energies(island, after, self.settings.balance)
+            better = going & valid & (now < FAR_HANDOVER * before)
+            if not better.any():
+                break
+            change = movement(island, group.uv, after)
+            group.moved(after, better)
+            value[group.pieces] = np.where(better, now, before)
+            self._note(group, valid, iteration.repaired, change, better)
+            going = better & (now >= _NEAR)
+            yield STEP
+            if not going.any():
+                break
+        start[group.rows] = self.best[group.rows] = group.uv
+        self.sure[group.pieces] = False
+        self.live = None  # whose outlines are not free
 
     def _in_air(
         self, pieces: np.ndarray, start: np.ndarray, following: bool = False, rigidly: np.ndarray | None = None

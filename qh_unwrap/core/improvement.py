@@ -27,7 +27,7 @@ from .unfolding import unfolded
 
 _HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement;
 _FAR = 200  # above this energy
-_FAR_HANDOVER = 0.5  # one that lowers it by less than this
+FAR_HANDOVER = 0.5  # one that lowers it by less than this
 _FOLDED = 0.2  # of a surface's area, that flipped triangles may have for it to be worth unfolding
 _FEW = 0.75  # once only this part of the vertices still moves, the others take part no longer
 
@@ -135,7 +135,7 @@ class Improvement:
             fine = going & valid & ~wrong_pieces([island], self.placed(group.island_uv, group.pieces, island))
             value = np.where(fine, energies(island, group.island_uv, settings.balance), np.inf)
             isometric = fine & self.refining & (value <= ISOMETRIC)
-            handover = np.where((value > _FAR) & ~self.batch.has_hold[group.pieces], _FAR_HANDOVER, _HANDOVER)
+            handover = np.where((value > _FAR) & ~self.batch.has_hold[group.pieces], FAR_HANDOVER, _HANDOVER)
             enough = fine & self.refining & (number > 0) & (value > (1 - handover) * least)
             better = fine & (~found | ~uneven | (value < least))
             best = np.where(better[island.vertex_piece, None], group.island_uv, best)
@@ -173,7 +173,7 @@ class Improvement:
             group.moved(after, going)
             valid = np.where(going, now_valid, valid)
             held_back = np.where(going, iteration.shortened, held_back)
-            change = np.where(going, _movement(group.domain.island, previous, group.island_uv), change)
+            change = np.where(going, movement(group.domain.island, previous, group.island_uv), change)
             self._note(group, valid, iteration.repaired, change, going)
 
     def _refine_best(self, group, best, recalled, sound):
@@ -218,7 +218,7 @@ class Improvement:
             island = domain.island
             fine = going & ~wrong_pieces([island], self.placed(group.island_uv, group.pieces, island))
             fine &= _folded(group) <= folded
-            change = _movement(island, previous, group.island_uv)
+            change = movement(island, previous, group.island_uv)
             self._note(group, fine, self.repaired[group.pieces], change, going)
             rows = fine[island.vertex_piece]
             self.best[group.rows[rows]] = group.island_uv[rows]
@@ -256,7 +256,7 @@ def _folded(group: Group) -> np.ndarray:
     return np.bincount(island.piece[flat], folded, island.piece_count)
 
 
-def _movement(island: Surface, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+def movement(island: Surface, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """The largest movement of a vertex of every piece by the diagonal of the box around it `after`, (p,)."""
     x, y = (after - before).T
     farthest = np.sqrt(np.maximum.reduceat(x * x + y * y, island.vertex_starts))

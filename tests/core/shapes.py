@@ -57,6 +57,15 @@ def hemisphere(rings=8, flattening=1.0):
     return np.array(vertices), np.array(triangles)
 
 
+def bulb(rings=8, opening=0.03, length=10.0):
+    """An ellipsoid so many times as long as wide, open at one end by such a share of the way from end to end."""
+    vertices, triangles = hemisphere(rings)
+    x, y, z = vertices.T
+    around, along = np.arctan2(y, x), 2 * (1 - opening) * np.arccos(z)
+    x, y = np.sin(along) * np.cos(around), np.sin(along) * np.sin(around)
+    return np.column_stack([x, y, length * np.cos(along)]), triangles
+
+
 def ring(around=16, across=3):
     """A flat disk with a round hole."""
     radius, angle = np.meshgrid(np.linspace(0.4, 1, across + 1), 2 * np.pi * np.arange(around) / around)

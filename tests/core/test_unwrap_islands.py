@@ -177,3 +177,19 @@ def test_given_uvs_are_measured_first():
     given, new = together([(vertices, triangles, uv), (vertices, triangles, None)])
     assert given.report.before.to_dict() == pytest.approx(distortion(vertices, triangles, uv).to_dict(), rel=1e-12)
     assert new.report.before is None
+
+
+def test_what_bulges_far_is_drawn_near_within_its_outline():
+    # In one batch with a flatter one, which needs fewer iterations, and a flat one, which needs none.
+    islands = [shapes.bulb(length=10), shapes.bulb(length=14), shapes.grid()]
+
+    def no_air(*_):
+        raise AssertionError("air is not needed")
+
+    results = finished(unwrap_islands([Shape(*island) for island in islands], Settings(), no_air))
+    for island, result in zip(islands, results, strict=True):
+        assert result.report.injective and result.report.converged
+        assert_alike(result, unwrap(*island))
+        in_air = unwrap(*island, Settings(initial="MEAN_VALUE"))
+        energies = (each.report.after.symmetric_dirichlet for each in (result, in_air))
+        assert next(energies) <= next(energies) * (1 + 1e-3)
