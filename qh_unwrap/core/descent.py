@@ -31,9 +31,10 @@ _TRUE = 0.2  # of what it promises, by which it may miss that and keep its promi
 _LEFT = 0.5  # of a decrease that is worth a step: less is left to old equations
 _CUT = 0.8  # of Newton's own step: one that ends before is cut short
 _SPRING = 1e-9  # that holds every vertex in its place, relative to what acts on it
-_ROUGH = 0.1  # residual of old equations, relative to the gradient,
-_RESIDUAL = 0.03  # of new ones,
-_SHARP = 0.002  # and where few triangles rule the gradient, so that the others go where they should not:
+_ROUGH = 0.1  # residual of the equations, relative to the gradient, on the way and of old equations,
+_FINE = 0.05  # after a step that has brought less than
+_MUCH = 0.15  # of what the energy lies above its least possible value,
+_SHARP = 0.01  # and where few triangles rule the gradient, so that the others go where they should not:
 _SHORT = 0.5  # after a step that one that all but collapses has made shorter than this,
 _EXTREME = 20  # or above so many times the least possible energy
 
@@ -52,7 +53,7 @@ class Descent:
     def __init__(self, balance: float, size: np.ndarray, patience: float = 1.0, rigidly: bool = False):
         self._balance, self._size, self._patience, self._rigidly = balance, size, patience, rigidly
         self._energy: Barrier | None = None
-        self._residual = np.full(len(size), _RESIDUAL)
+        self._residual = np.full(len(size), _ROUGH)
         self._drop = np.full(len(size), np.inf)  # of the energy in the last step,
         self._little = np.zeros(len(size), bool)  # whether that brought little,
         self._hindered = np.ones(len(size), bool)  # and whether it was cut short
@@ -92,7 +93,9 @@ class Descent:
         yield PART
         after, value, moved, slope, limit = _moved(domain, energy, uv, before, start, going, gradient, direction)
         hard = (limit < _SHORT) | (value > _EXTREME * energy.least)
-        self._residual, self._hindered = np.where(hard, _SHARP, _RESIDUAL), going & (limit < _CUT)
+        much = start - value >= _MUCH * (start - energy.least)
+        self._residual = np.where(hard, _SHARP, np.where(much, _ROUGH, _FINE))
+        self._hindered = going & (limit < _CUT)
         done, nearly = self._ends(energy, start, value, -slope / 2, limit)
         if nearly.any():
             yield PART
@@ -153,7 +156,7 @@ def descended(
     piece, (p,), and which have moved, (p,) bool.
     """
     gradient, beside, own = _newton_equations(domain, energy, jacobian)
-    direction = domain.constrained.newton_direction(gradient, beside, own, _RESIDUAL)
+    direction = domain.constrained.newton_direction(gradient, beside, own, _FINE)
     return _moved(domain, energy, uv, jacobian, start, going, gradient, direction)[:3]
 
 
