@@ -255,15 +255,15 @@ class Course(Improvement):
                 break
             change = movement(island, group.uv, after)
             group.moved(after, better)
+            start[group.rows] = self.best[group.rows] = group.uv
             value[group.pieces] = np.where(better, now, before)
+            self.sure[group.pieces] = False
             self._note(group, valid, iteration.repaired, change, better)
-            going = better & (now >= _NEAR)
+            self.live = None  # whoever goes on from here frees the outlines
             yield STEP
+            going = better & (now >= _NEAR)
             if not going.any():
                 break
-        start[group.rows] = self.best[group.rows] = group.uv
-        self.sure[group.pieces] = False
-        self.live = None  # whose outlines are not free
 
     def _in_air(
         self, pieces: np.ndarray, start: np.ndarray, following: bool = False, rigidly: np.ndarray | None = None

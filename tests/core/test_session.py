@@ -117,6 +117,19 @@ def test_other_settings_lead_no_higher_where_it_stretches_much(balance):
     assert energy(mesh, only(session).uv, balance) < (1 + 1e-4) * energy(mesh, fresh.uv, balance)
 
 
+@pytest.mark.parametrize("after", [1, 2, 3])
+def test_other_settings_free_an_outline_that_is_held_on_the_way(after):
+    bulb = shapes.bulb()
+    session = Unwrapper([Shape(*bulb)])
+    for _ in range(after):
+        session.step()
+    session.settings = Settings(iterations=19)
+    steps(session)
+    report, expected = only(session).report, unwrap(*bulb).report
+    assert report.injective and report.converged
+    assert report.after.symmetric_dirichlet == pytest.approx(expected.after.symmetric_dirichlet, rel=2e-3)
+
+
 def test_another_boundary_begins_anew(bump):
     session = Unwrapper([Shape(*bump)])
     steps(session)
