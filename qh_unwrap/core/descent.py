@@ -89,7 +89,10 @@ class Descent:
             return uv, after, np.zeros(len(start), bool)
         gradient, beside, own = _newton_equations(domain, energy, before)
         yield PART
-        direction = domain.constrained.newton_direction(gradient, beside, own, self._residual)
+        # What begins near the least possible value has little to gain from the first step on.
+        near = np.isinf(self._drop) & (start - energy.least < _MUCH * energy.least)
+        residual = np.where(near, np.minimum(self._residual, _FINE), self._residual)
+        direction = domain.constrained.newton_direction(gradient, beside, own, residual)
         yield PART
         after, value, moved, slope, limit = _moved(domain, energy, uv, before, start, going, gradient, direction)
         hard = (limit < _SHORT) | (value > _EXTREME * energy.least)
