@@ -31,6 +31,7 @@ _NEAR = 3.5  # the energy of a start from which the refinement alone soon arrive
 _SMALL_NEAR = 200.0  # and in a piece with few triangles and no long outline: some steps more take less time than air
 _FEW = 5000  # triangles
 _BY_ANGLES = 0.5  # the balance above which conformal maps are nearer to the best than rigid triangles lead
+_BY_AREAS = 0.25  # the balance below which iterations within an outline seldom lead to where the best map is
 _LONG = 1.5  # the squared outline from which on it may well cross itself, relative to that of a disk of the same area
 _IN_AIR = 5000  # vertices of the pieces that are improved together with air around them
 _LEADS = 12  # times that pins are moved on, before their island begins anew
@@ -208,7 +209,10 @@ class Course(Improvement):
             far = small & new & directly & np.isfinite(value) & (value >= _SMALL_NEAR) & ~batch.has_hold
             if certified is not None:
                 far &= certified
-            if far.any():
+            # Holes would be held as well, and iterations fold faces without area over.
+            far &= np.bincount(surface.loop_piece) == 1
+            far[surface.piece[surface.degenerate]] = False
+            if far.any() and settings.balance >= _BY_AREAS:
                 yield from self._drawn_near(start, value, far)
             soon = value < np.where(small, _SMALL_NEAR, _NEAR)
             if soon.any():
