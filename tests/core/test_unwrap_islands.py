@@ -2,7 +2,18 @@
 import numpy as np
 import pytest
 
-from qh_unwrap.core import Result, Settings, Shape, Surface, distortion, errors, unwrap, unwrap_islands, unwrapping
+from qh_unwrap.core import (
+    Result,
+    Settings,
+    Shape,
+    Surface,
+    course,
+    distortion,
+    errors,
+    unwrap,
+    unwrap_islands,
+    unwrapping,
+)
 from qh_unwrap.core.delaunay import triangulate
 from qh_unwrap.core.initial import fit
 from qh_unwrap.core.stepping import finished
@@ -193,3 +204,23 @@ def test_what_bulges_far_is_drawn_near_within_its_outline():
         in_air = unwrap(*island, Settings(initial="MEAN_VALUE"))
         energies = (each.report.after.symmetric_dirichlet for each in (result, in_air))
         assert next(energies) <= next(energies) * (1 + 1e-3)
+
+
+def with_hole(vertices, triangles):
+    return vertices, np.delete(triangles, len(triangles) // 2, axis=0)
+
+
+def with_flat_face(vertices, triangles):
+    a, b, c = triangles[len(triangles) // 2]
+    m = len(vertices)
+    rest = np.delete(triangles, len(triangles) // 2, axis=0)
+    return np.vstack([vertices, (vertices[a] + vertices[b]) / 2]), np.vstack([rest, [(a, m, c), (m, b, c), (m, a, b)]])
+
+
+@pytest.mark.parametrize(("change", "balance"), [(with_hole, 0.25), (with_flat_face, 0.25), (lambda *mesh: mesh, 0.1)])
+def test_what_the_outline_would_spoil_is_not_held_by_it(monkeypatch, change, balance):
+    def drawn_near(*_):
+        raise AssertionError("it is held")
+
+    monkeypatch.setattr(course.Course, "_drawn_near", drawn_near)
+    assert unwrap(*change(*shapes.bulb()), Settings(balance=balance)).report.injective
