@@ -53,8 +53,9 @@ class Repair:
             for chart in domain.charts:
                 flipped = wrong_triangles(chart, uv) & in_island[chart.piece]
                 marked[chart.triangles[flipped]] = True
-            for _ in range(2):  # and two rings around them
-                marked[domain.triangles.edges[marked[domain.triangles.edges].any(axis=1)]] = True
+            edges = domain.triangles.edges[in_island[domain.vertex_piece[domain.triangles.edges[:, 0]]]]
+            for _ in range(2):  # and two rings around them, but around none in pieces that are mended
+                marked[edges[marked[edges].any(axis=1)]] = True
             again = domain.constrained.solve(_raised(domain, weights, marked))
             uv = np.where(in_island[domain.vertex_piece][:, None], again, uv)
             wrong = wrong_pieces(domain.charts, uv)
