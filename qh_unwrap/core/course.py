@@ -16,10 +16,9 @@ from .chart import Surface
 from .domain import Fixed, loose, outlined, rigid
 from .energy import ISOMETRIC, energies
 from .errors import SingularError
-from .improvement import FAR_HANDOVER, D, Group, Improvement, Steps, movement
+from .improvement import D, Group, Improvement, Steps
 from .pins import lead, way_of
 from .plane import Plane, airs_around
-from .quasi_harmonic import Iteration
 from .settings import Settings
 from .starts import before_pins, best_start, natural_start, start_within, with_pins
 from .stepping import PART, STEP
@@ -245,29 +244,12 @@ class Course(Improvement):
             yield from self._in_air(far, start.copy(), rigidly=far & rigidly & (value < _NEAR))
 
     def _drawn_near(self, start: np.ndarray, value: np.ndarray, pieces: np.ndarray) -> Steps:
-        """Iterate from the maps `start` (n, 2) of the chosen pieces (p,) bool within their outlines, as long as that
-        halves their energies `value` (p,), until the refinement will soon arrive: both arrays tell how far that led."""
+        """Iterate from the maps `start` (n, 2) of the chosen pieces (p,) bool within their outlines, until the
+        refinement will soon arrive, if that lowers their energies `value` (p,) much: both tell how far that led."""
         group = self._group(pieces, start, rigid)
-        iteration, going = Iteration(group.domain, self.settings), np.ones(len(group.pieces), bool)
-        for _ in range(self.settings.iterations):
-            yield PART
-            _, after, valid = iteration.step(group.uv)
-            island = group.domain.island
-            before, now = value[group.pieces], energies(island, after, self.settings.balance)
-            better = going & valid & (now < FAR_HANDOVER * before)
-            if not better.any():
-                break
-            change = movement(island, group.uv, after)
-            group.moved(after, better)
-            start[group.rows] = self.best[group.rows] = group.uv
-            value[group.pieces] = np.where(better, now, before)
-            self.sure[group.pieces] = False
-            self._note(group, valid, iteration.repaired, change, better)
-            self.live = None  # whoever goes on from here frees the outlines
-            yield STEP
-            going = better & (now >= _NEAR)
-            if not going.any():
-                break
+        for part in self.iterate(group, value, _NEAR):
+            start[group.rows] = group.uv
+            yield part
 
     def _in_air(
         self, pieces: np.ndarray, start: np.ndarray, following: bool = False, rigidly: np.ndarray | None = None

@@ -27,7 +27,7 @@ from .unfolding import unfolded
 
 _HANDOVER = 0.9  # an iteration that lowers the energy by less, relative to it, gives way to the refinement;
 _FAR = 200  # above this energy
-FAR_HANDOVER = 0.5  # one that lowers it by less than this
+_FAR_HANDOVER = 0.5  # one that lowers it by less than this
 _FOLDED = 0.2  # of a surface's area, that flipped triangles may have for it to be worth unfolding
 _FEW = 0.75  # once only this part of the vertices still moves, the others take part no longer
 
@@ -135,7 +135,7 @@ class Improvement:
             fine = going & valid & ~wrong_pieces([island], self.placed(group.island_uv, group.pieces, island))
             value = np.where(fine, energies(island, group.island_uv, settings.balance), np.inf)
             isometric = fine & self.refining & (value <= ISOMETRIC)
-            handover = np.where((value > _FAR) & ~self.batch.has_hold[group.pieces], FAR_HANDOVER, _HANDOVER)
+            handover = np.where((value > _FAR) & ~self.batch.has_hold[group.pieces], _FAR_HANDOVER, _HANDOVER)
             enough = fine & self.refining & (number > 0) & (value > (1 - handover) * least)
             better = fine & (~found | ~uneven | (value < least))
             best = np.where(better[island.vertex_piece, None], group.island_uv, best)
@@ -173,8 +173,31 @@ class Improvement:
             group.moved(after, going)
             valid = np.where(going, now_valid, valid)
             held_back = np.where(going, iteration.shortened, held_back)
-            change = np.where(going, movement(group.domain.island, previous, group.island_uv), change)
+            change = np.where(going, _movement(group.domain.island, previous, group.island_uv), change)
             self._note(group, valid, iteration.repaired, change, going)
+
+    def iterate(self, group: Group, value: np.ndarray, enough: float) -> Steps:
+        """Iterate alone, in every piece as long as that halves its energy and leaves it above `enough`; `value` (p,),
+        of all the batch's pieces, is kept up with that.  Whoever goes on from there does so in another domain."""
+        iteration, going = Iteration(group.domain, self.settings), np.ones(len(group.pieces), bool)
+        for _ in range(self.settings.iterations):
+            yield PART
+            _, after, valid = iteration.step(group.uv)
+            before, now = value[group.pieces], energies(group.domain.island, after, self.settings.balance)
+            going &= valid & (now < _FAR_HANDOVER * before)
+            if not going.any():
+                break
+            change = _movement(group.domain.island, group.uv, after)
+            group.moved(after, going)
+            self.best[group.rows] = group.island_uv
+            value[group.pieces] = np.where(going, now, before)
+            self.sure[group.pieces] = False
+            self._note(group, valid, iteration.repaired, change, going)
+            self.live = None
+            yield STEP
+            going = going & (now >= enough)
+            if not going.any():
+                break
 
     def _refine_best(self, group, best, recalled, sound):
         """Refine the `best` maps (n', 2) of the group's pieces, which in those to be `recalled` (p',) bool are not the
@@ -218,7 +241,7 @@ class Improvement:
             island = domain.island
             fine = going & ~wrong_pieces([island], self.placed(group.island_uv, group.pieces, island))
             fine &= _folded(group) <= folded
-            change = movement(island, previous, group.island_uv)
+            change = _movement(island, previous, group.island_uv)
             self._note(group, fine, self.repaired[group.pieces], change, going)
             rows = fine[island.vertex_piece]
             self.best[group.rows[rows]] = group.island_uv[rows]
@@ -256,7 +279,7 @@ def _folded(group: Group) -> np.ndarray:
     return np.bincount(island.piece[flat], folded, island.piece_count)
 
 
-def movement(island: Surface, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+def _movement(island: Surface, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """The largest movement of a vertex of every piece by the diagonal of the box around it `after`, (p,)."""
     x, y = (after - before).T
     farthest = np.sqrt(np.maximum.reduceat(x * x + y * y, island.vertex_starts))
