@@ -205,14 +205,14 @@ class Course(Improvement):
         value, winding = energies(surface, start, settings.balance), surface.outline_lengths**2 > _LONG * 4 * np.pi
         if self.refining:
             small = ~winding & (np.bincount(surface.piece, minlength=p) <= _FEW)
-            far = small & new & directly & np.isfinite(value) & (value >= _SMALL_NEAR) & ~batch.has_hold
+            bulging = small & new & directly & np.isfinite(value) & (value >= _SMALL_NEAR) & ~batch.has_hold
             if certified is not None:
-                far &= certified
+                bulging &= certified
             # Holes would be held as well, and iterations fold faces without area over.
-            far &= np.bincount(surface.loop_piece) == 1
-            far[surface.piece[surface.degenerate]] = False
-            if far.any() and settings.balance >= _BY_AREAS:
-                yield from self._drawn_near(start, value, far)
+            bulging &= np.bincount(surface.loop_piece) == 1
+            bulging[surface.piece[surface.degenerate]] = False
+            if bulging.any() and settings.balance >= _BY_AREAS:
+                yield from self._drawn_near(start, value, bulging)
             soon = value < np.where(small, _SMALL_NEAR, _NEAR)
             if soon.any():
                 certified = certified_pieces(surface, start) if certified is None else certified

@@ -65,7 +65,6 @@ def led(points: np.ndarray, held: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def project(surface: Surface) -> np.ndarray:
     """The projection of every piece on its least-squares plane, seen from the side that its faces look to, (n, 2)."""
-
     points = np.asfortranarray(surface.vertices)
 
     def moments(corner_vertex):
